@@ -1,0 +1,1 @@
+"""The behaviour tree that plans, acts, watches and plans again."""

@@ -1,0 +1,1 @@
+"""Trees as text, dot, SVG and HTML."""

@@ -1,0 +1,87 @@
+"""What the world refused, as values. Errors (wrong input) are exceptions; these are not."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from planner.task.symbols import GroundAction
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """Why one sample of an action could not be refined.
+
+    `sample` is the skill's own plain value (a grasp, a stroke …), kept so that it can be tried
+    first once its culprits are away. `culprits` are the movable bodies that were in the way:
+    without them the sample works. Empty culprits: the sample fails whatever is moved aside.
+    """
+
+    sample: Any
+    reason: str
+    culprits: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Failure:
+    """An action that can't be refined, or failed while running.
+
+    `reason` is one sentence for people. `depends_on` names bodies at whose present pose the
+    failure holds (the object itself: no grasp while it lies so; the culprits of each sample).
+    """
+
+    action: GroundAction
+    reason: str
+
+    @property
+    def kind(self) -> str:
+        return type(self).__name__
+
+
+@dataclass(frozen=True)
+class RefinementFailure(Failure):
+    """No sample within the budget works: one record a sample that was tried."""
+
+    attempts: tuple[Blocked, ...] = ()
+
+    @property
+    def culprit_sets(self) -> frozenset[frozenset[str]]:
+        """The distinct non-empty culprit sets of the samples."""
+        return frozenset(a.culprits for a in self.attempts if a.culprits)
+
+
+@dataclass(frozen=True)
+class ExecutionFailure(Failure):
+    """Something went wrong while acting; `sample` is what was being executed."""
+
+    sample: Any = None
+
+
+@dataclass(frozen=True)
+class MotionFailure:
+    """No motion was found: why, and the bodies in the way (empty: the scene itself or the arm's reach)."""
+
+    reason: str
+    culprits: frozenset[str] = frozenset()
+
+
+class GraspMissed(ExecutionFailure):
+    """The hand closed on nothing."""
+
+
+class GraspSlipped(ExecutionFailure):
+    """The held object left the hand or moved in it."""
+
+
+class ContactLost(ExecutionFailure):
+    """Contact that the motion needs was lost, or never found."""
+
+
+class PathBlocked(ExecutionFailure):
+    """Something stands in the remaining path."""
+
+
+class EffectMissing(ExecutionFailure):
+    """The motion ended, but what it was for isn't true."""
+
+
+class ForceExceeded(ExecutionFailure):
+    """A contact force passed its limit."""

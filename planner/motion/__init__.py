@@ -1,0 +1,1 @@
+"""Geometry of motion: collision, inverse kinematics, OMPL, timing."""

@@ -1,0 +1,79 @@
+"""A timed joint path, and how to read it at any time."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Joint configurations q (n,7) in rad and velocities v (n,7) in rad/s at strictly rising times (n,) in s.
+
+    Between knots the motion is the cubic Hermite polynomial through both ends, so position and
+    velocity are continuous. Before the first and after the last knot it stands still there.
+    """
+
+    times: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+
+    def __post_init__(self) -> None:
+        n = len(self.times)
+        if n < 1 or self.q.shape != (n, 7) or self.v.shape != (n, 7):
+            raise ValueError(f"trajectory shapes: times {self.times.shape}, q {self.q.shape}, v {self.v.shape}, expected (n,), (n,7), (n,7)")
+        if np.any(np.diff(self.times) <= 0):
+            raise ValueError("trajectory times must rise strictly")
+        for array in (self.times, self.q, self.v):
+            array.setflags(write=False)
+
+    @staticmethod
+    def standstill(q: np.ndarray, duration: float = 0.0) -> "Trajectory":
+        """Stay at q (7,) for `duration` seconds."""
+        q = np.array(q, dtype=float)
+        if duration <= 0:
+            return Trajectory(np.zeros(1), q[None], np.zeros((1, 7)))
+        return Trajectory(np.array([0.0, duration]), np.stack([q, q]), np.zeros((2, 7)))
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first knot to the last."""
+        return float(self.times[-1] - self.times[0])
+
+    @property
+    def start(self) -> np.ndarray:
+        return self.q[0]
+
+    @property
+    def end(self) -> np.ndarray:
+        return self.q[-1]
+
+    @cached_property
+    def length(self) -> float:
+        """Length of the joint path in rad (Euclidean over the joints, knot to knot)."""
+        return float(np.linalg.norm(np.diff(self.q, axis=0), axis=1).sum())
+
+    def at(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Position, velocity and acceleration (7,) at t seconds after the first knot."""
+        s = t + self.times[0]
+        if s <= self.times[0]:
+            return self.q[0], np.zeros(7), np.zeros(7)
+        if s >= self.times[-1]:
+            return self.q[-1], np.zeros(7), np.zeros(7)
+        i = int(np.searchsorted(self.times, s, side="right")) - 1
+        h = self.times[i + 1] - self.times[i]
+        u = (s - self.times[i]) / h
+        q0, q1 = self.q[i], self.q[i + 1]
+        m0, m1 = h * self.v[i], h * self.v[i + 1]
+        d = q1 - q0
+        c2 = 3 * d - 2 * m0 - m1
+        c3 = m0 + m1 - 2 * d
+        q = q0 + u * (m0 + u * (c2 + u * c3))
+        v = (m0 + u * (2 * c2 + 3 * u * c3)) / h
+        a = (2 * c2 + 6 * u * c3) / h**2
+        return q, v, a
+
+    def sampled(self, step: float) -> np.ndarray:
+        """Configurations (k,7) every `step` seconds, both ends included."""
+        count = max(2, int(np.ceil(self.duration / step)) + 1)
+        return np.array([self.at(t)[0] for t in np.linspace(0.0, self.duration, count)])

@@ -1,0 +1,112 @@
+"""The interface between the search-then-sample loop and the skills.
+
+The loop knows no skill by name: it asks a `Refiner` to turn an action into motion in a scene, and
+to predict the scene afterwards. What comes back is plain data: phases, each with a trajectory,
+a control mode and the contacts it declares.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from planner.failure import RefinementFailure
+from planner.motion.trajectory import Trajectory
+from planner.task.symbols import GroundAction
+from sim.scene import SceneState
+
+Pair = frozenset[str]
+"""Two names that may touch: robot links, bodies, fixtures, regions or the table."""
+
+
+def pairs(first: frozenset[str] | str, second: frozenset[str] | str) -> frozenset[Pair]:
+    """Every pair of one name of `first` with one of `second`."""
+    left = {first} if isinstance(first, str) else first
+    right = {second} if isinstance(second, str) else second
+    return frozenset(frozenset((a, b)) for a in left for b in right)
+
+
+@dataclass(frozen=True)
+class Press:
+    """Contact force of a phase: `force` N along −z of W, with `stiffness` (6,) (N/m, Nm/rad; linear first, in W)
+    in the directions that are not force-controlled."""
+
+    force: float
+    stiffness: np.ndarray
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One stretch of an action: what the arm and the fingers do, and which contacts that may make.
+
+    kind "move": follow the trajectory in joint space. "approach": the same along a straight line
+    near contact, `allowed` pairs may touch. "grip": hold still and drive the fingers to `opening`
+    (None: close until the object resists). "touch": lower along the trajectory until contact with
+    `press.force`. "slide": follow the trajectory pressed with `press`. "lift": leave contact upwards.
+    """
+
+    name: str
+    kind: Literal["move", "approach", "grip", "touch", "slide", "lift"]
+    trajectory: Trajectory
+    allowed: frozenset[Pair] = frozenset()
+    opening: float | None = None
+    press: Press | None = None
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """An action made concrete in one scene: the sample that was chosen and the motion that does it."""
+
+    action: GroundAction
+    sample: Any
+    phases: tuple[Phase, ...]
+    checks: int = 0
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much one refinement may cost: samples tried, and planner checks per motion query."""
+
+    tries: int = 20
+    motion_checks: int = 4000
+
+    def widened(self, factor: int = 2) -> "Budget":
+        """The same budget, `factor` times as large."""
+        return Budget(self.tries * factor, self.motion_checks * factor)
+
+
+@dataclass(frozen=True)
+class Hints:
+    """Which samples to try first (what worked, or what was blocked by something now away) and which not again."""
+
+    first: tuple[Any, ...] = ()
+    avoid: frozenset[Any] = frozenset()
+
+
+@dataclass
+class Work:
+    """Counts what planning costs, for simulated time: collision checks, IK calls, task expansions."""
+
+    counts: dict[str, int] = field(default_factory=dict)
+
+    def add(self, what: str, amount: int = 1) -> None:
+        self.counts[what] = self.counts.get(what, 0) + amount
+
+
+class Refiner(Protocol):
+    """What the search-then-sample loop needs of a skill."""
+
+    def refine(
+        self, action: GroundAction, scene: SceneState, rng: np.random.Generator, budget: Budget, hints: Hints
+    ) -> Refinement | RefinementFailure:
+        """Find a sample and its motion in this scene, starting from scene.q."""
+        ...
+
+    def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
+        """The scene after the refined action went as meant: everything that moves, moved."""
+        ...
+
+
+Refiners = Mapping[str, Refiner]
+"""Refiner by action name."""

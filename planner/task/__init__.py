@@ -1,0 +1,1 @@
+"""PDDL: symbols, facts of a scene, Pyperplan, and what failures teach."""

@@ -1,0 +1,68 @@
+"""Facts, ground actions and task plans."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, order=True)
+class Fact:
+    """A ground positive literal, `in_bin(book, table)`."""
+
+    predicate: str
+    args: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.predicate}({', '.join(self.args)})"
+
+    @property
+    def pddl(self) -> str:
+        """The literal as PDDL text."""
+        return f"({' '.join((self.predicate, *self.args))})"
+
+
+@dataclass(frozen=True, order=True)
+class GroundAction:
+    """A primitive with its arguments, `drag(book, table)`."""
+
+    name: str
+    args: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.name}({', '.join(self.args)})"
+
+
+@dataclass(frozen=True)
+class Step:
+    """A plan's step: the action, and the facts it needs, adds and deletes (as the planner grounded it)."""
+
+    action: GroundAction
+    preconditions: frozenset[Fact]
+    adds: frozenset[Fact]
+    deletes: frozenset[Fact]
+
+    def applicable(self, facts: frozenset[Fact]) -> bool:
+        """Do the facts satisfy every precondition?"""
+        return self.preconditions <= facts
+
+    def apply(self, facts: frozenset[Fact]) -> frozenset[Fact]:
+        """The facts after the step (deletes before adds, as in STRIPS)."""
+        return (facts - self.deletes) | self.adds
+
+
+@dataclass(frozen=True)
+class TaskPlan:
+    """Steps in the order in which they are to be done, and the goal they lead to."""
+
+    steps: tuple[Step, ...]
+    goal: frozenset[Fact]
+
+    @property
+    def actions(self) -> tuple[GroundAction, ...]:
+        return tuple(step.action for step in self.steps)
+
+
+@dataclass(frozen=True)
+class NoTaskPlan:
+    """The task planner found nothing. `exhausted`: the search space was searched whole, so none exists."""
+
+    exhausted: bool
+    expansions: int

@@ -1,0 +1,63 @@
+"""The scene as believed: the declared scenario, and where its movable bodies and the arm are.
+
+The planner predicts with it and the executive observes into it; both see the same type.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+from pinocchio import SE3
+
+from scenarios.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Held:
+    """What the hand holds: the body's name and its pose X_GO in the gripper frame G."""
+
+    name: str
+    X_GO: SE3
+
+
+@dataclass(frozen=True)
+class SceneState:
+    """Poses X_WO of all movable bodies, the arm's configuration q (7,) in rad, the hand's opening in metres.
+
+    `held` is None for an empty hand. A held body's entry in `poses` is where it was observed or
+    predicted to be; `held.X_GO` says how it moves along with the hand.
+    """
+
+    scenario: Scenario
+    poses: Mapping[str, SE3]
+    q: np.ndarray
+    opening: float
+    held: Held | None = None
+
+    def __post_init__(self) -> None:
+        q = np.array(self.q, dtype=float)
+        q.setflags(write=False)
+        object.__setattr__(self, "q", q)
+        object.__setattr__(self, "poses", MappingProxyType(dict(self.poses)))
+
+    @staticmethod
+    def initial(scenario: Scenario, opening: float) -> "SceneState":
+        """The scenario's start: every body at its declared pose, the arm at q0, the hand empty."""
+        poses = {name: body.X_WO for name, body in scenario.bodies.items()}
+        return SceneState(scenario, poses, scenario.robot.q0, opening)
+
+    def moved(self, name: str, X_WO: SE3) -> "SceneState":
+        """The same scene with one body elsewhere."""
+        return replace(self, poses={**self.poses, name: X_WO})
+
+    def without(self, names: frozenset[str]) -> "SceneState":
+        """The same scene with the named bodies taken out of the world (they obstruct nothing)."""
+        return replace(self, poses={n: X for n, X in self.poses.items() if n not in names})
+
+
+def pose_distance(X_WA: SE3, X_WB: SE3) -> tuple[float, float]:
+    """Distance in metres and angle in rad between two poses."""
+    delta = X_WA.inverse() * X_WB
+    cosine = (np.trace(delta.rotation) - 1) / 2
+    return float(np.linalg.norm(delta.translation)), float(np.arccos(np.clip(cosine, -1.0, 1.0)))

@@ -1,0 +1,1 @@
+"""The torque controller: a task-space QP, its tasks, limits and contacts."""
