@@ -11,6 +11,7 @@ import numpy as np
 from pinocchio import SE3
 
 from scenarios.scenario import Scenario
+from scenarios.shapes import Box, Shape, extents
 
 
 @dataclass(frozen=True)
@@ -61,3 +62,20 @@ def pose_distance(X_WA: SE3, X_WB: SE3) -> tuple[float, float]:
     delta = X_WA.inverse() * X_WB
     cosine = (np.trace(delta.rotation) - 1) / 2
     return float(np.linalg.norm(delta.translation)), float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def floor_height(scenario: Scenario) -> float:
+    """Height in metres of the floor: level with the lowest of robot base, table, regions and fixtures."""
+    bottoms = [float(scenario.robot.X_WB.translation[2]), _bottom(scenario.table.shape, scenario.table.X_WT)]
+    bottoms += [_bottom(Box(region.size), region.X_WR) for region in scenario.regions.values()]
+    bottoms += [_bottom(fixture.shape, fixture.X_WO) for fixture in scenario.fixtures.values()]
+    return min(bottoms)
+
+
+def half_height(shape: Shape, R_WO: np.ndarray) -> float:
+    """Half the vertical extent in metres of a shape's bounding box turned by R_WO."""
+    return float(np.abs(R_WO[2]) @ extents(shape)) / 2
+
+
+def _bottom(shape: Shape, X_WO: SE3) -> float:
+    return float(X_WO.translation[2]) - half_height(shape, X_WO.rotation)

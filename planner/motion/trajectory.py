@@ -21,7 +21,9 @@ class Trajectory:
     def __post_init__(self) -> None:
         n = len(self.times)
         if n < 1 or self.q.shape != (n, 7) or self.v.shape != (n, 7):
-            raise ValueError(f"trajectory shapes: times {self.times.shape}, q {self.q.shape}, v {self.v.shape}, expected (n,), (n,7), (n,7)")
+            raise ValueError(
+                f"trajectory shapes: times {self.times.shape}, q {self.q.shape}, v {self.v.shape}, expected (n,), (n,7), (n,7)"
+            )
         if np.any(np.diff(self.times) <= 0):
             raise ValueError("trajectory times must rise strictly")
         for array in (self.times, self.q, self.v):

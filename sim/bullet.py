@@ -1,0 +1,294 @@
+"""A simulated world behind the `Plant` seam: PyBullet at 1 kHz.
+
+The arm moves by joint torques alone and things are held by friction. The only constraint is the
+gear that couples the two fingers, as in the real gripper. Two frictions combine as their product.
+"""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pybullet as p
+import pybullet_data
+from pinocchio import SE3
+
+from scenarios.regions import parts
+from scenarios.scenario import Scenario
+from scenarios.shapes import Box, Cylinder, Shape, Sphere
+from sim.plant import Command, GripCommand, Observation
+from sim.robot import GRAVITY, RobotModel
+from sim.scene import floor_height
+from sim.wrench import Wrench
+
+PHYSICS_STEP = 1e-3
+"""Seconds a step: at 240 Hz a sponge held by friction turns in the hand."""
+
+SOLVER_ITERATIONS = 50
+PEDESTAL_SIZE = 0.24
+FLOOR_FRICTION = 0.8
+GEAR_FORCE = 400.0
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A true contact point: the two names, position (3,) in W, force (3,) in N on the first, in W."""
+
+    first: str
+    second: str
+    position: np.ndarray
+    force: np.ndarray
+    normal_force: float
+
+
+@contextmanager
+def resolved_urdf(robot: RobotModel) -> Iterator[str]:
+    """Path of a copy of the robot's URDF with `package://pybullet_data` replaced by where it is installed."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / robot.urdf.name
+        path.write_text(robot.urdf.read_text().replace("package://pybullet_data", pybullet_data.getDataPath()))
+        yield str(path)
+
+
+class BulletPlant:
+    """A `Plant` for a scenario. Every quantity in SI units and in W unless said otherwise."""
+
+    def __init__(self, scenario: Scenario, robot: RobotModel, window: bool = False) -> None:
+        self.scenario = scenario
+        self.timestep = PHYSICS_STEP
+        self._t = 0.0
+        self._client = p.connect(p.GUI if window else p.DIRECT)
+        self._names: dict[int, str] = {}
+        p.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
+        p.setPhysicsEngineParameter(
+            fixedTimeStep=PHYSICS_STEP,
+            numSolverIterations=SOLVER_ITERATIONS,
+            deterministicOverlappingPairs=1,
+            physicsClientId=self._client,
+        )
+        self._add_room(scenario)
+        self._bodies = {name: self._add_body(name) for name in scenario.bodies}
+        self._add_robot(scenario, robot)
+
+    def close(self) -> None:
+        """Free the engine. The plant can't be used afterwards."""
+        p.disconnect(self._client)
+
+    def observe(self) -> Observation:
+        arm = p.getJointStates(self._robot, self._arm_joints, physicsClientId=self._client)
+        fingers = p.getJointStates(self._robot, self._finger_joints, physicsClientId=self._client)
+        sensor = p.getJointState(self._robot, self._sensor_joint, physicsClientId=self._client)[2]
+        poses, velocities = {}, {}
+        for name, body in self._bodies.items():
+            position, quaternion = p.getBasePositionAndOrientation(body, physicsClientId=self._client)
+            linear, angular = p.getBaseVelocity(body, physicsClientId=self._client)
+            poses[name] = pin.XYZQUATToSE3(np.array(position + quaternion))
+            velocities[name] = np.array(linear + angular)
+        return Observation(
+            t=self._t,
+            q=np.array([state[0] for state in arm]),
+            v=np.array([state[1] for state in arm]),
+            tau=self._tau.copy(),
+            opening=fingers[0][0] + fingers[1][0],
+            opening_velocity=fingers[0][1] + fingers[1][1],
+            grip_force=(abs(fingers[0][3]) + abs(fingers[1][3])) / 2,
+            wrist=Wrench(-np.array(sensor[:3]), -np.array(sensor[3:])),
+            poses=poses,
+            velocities=velocities,
+        )
+
+    def apply(self, command: Command) -> None:
+        if not np.all(np.isfinite(command.tau)):
+            raise ValueError(f"torque command must be finite, got {command.tau}")
+        self._tau = np.clip(command.tau, -self._tau_max, self._tau_max)
+        speed = float(np.clip(command.grip.speed, -self._max_grip_speed, self._max_grip_speed)) / 2
+        force = float(np.clip(command.grip.force, 0.0, self._max_grip_force))
+        p.setJointMotorControlArray(
+            self._robot,
+            self._finger_joints,
+            p.VELOCITY_CONTROL,
+            targetVelocities=[speed, speed],
+            forces=[force, force],
+            physicsClientId=self._client,
+        )
+
+    def step(self) -> None:
+        # PyBullet forgets applied torques after each step.
+        p.setJointMotorControlArray(
+            self._robot, self._arm_joints, p.TORQUE_CONTROL, forces=self._tau, physicsClientId=self._client
+        )
+        p.stepSimulation(physicsClientId=self._client)
+        self._t += PHYSICS_STEP
+
+    def contacts(self) -> list[Contact]:
+        """True contacts that carry force, for reports and benchmarks; the executive never reads them."""
+        found = []
+        for point in p.getContactPoints(physicsClientId=self._client):
+            normal_force = point[9]
+            if normal_force <= 0.0:
+                continue
+            normal = np.array(point[7])
+            friction = point[10] * np.array(point[11]) + point[12] * np.array(point[13])
+            first, second = self._name(point[1], point[3]), self._name(point[2], point[4])
+            found.append(Contact(first, second, np.array(point[6]), normal * normal_force + friction, normal_force))
+        return found
+
+    def push(self, force: np.ndarray) -> None:
+        """Apply a force (3,) in N, in W, at the tool centre during the next step."""
+        tcp = p.getLinkState(self._robot, self._tcp_link, computeForwardKinematics=True, physicsClientId=self._client)
+        p.applyExternalForce(
+            self._robot, self._tcp_link, list(force), tcp[0], p.WORLD_FRAME, physicsClientId=self._client
+        )
+
+    def _name(self, body: int, link: int) -> str:
+        if body == self._robot:
+            return self._link_names[link]
+        return self._names[body]
+
+    def _collision_shape(self, shape: Shape) -> int:
+        match shape:
+            case Box(size):
+                return p.createCollisionShape(
+                    p.GEOM_BOX, halfExtents=[s / 2 for s in size], physicsClientId=self._client
+                )
+            case Cylinder(radius, height):
+                return p.createCollisionShape(
+                    p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._client
+                )
+            case Sphere(radius):
+                return p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=self._client)
+
+    def _visual_shape(self, shape: Shape, color: tuple[float, float, float, float]) -> int:
+        match shape:
+            case Box(size):
+                return p.createVisualShape(
+                    p.GEOM_BOX, halfExtents=[s / 2 for s in size], rgbaColor=color, physicsClientId=self._client
+                )
+            case Cylinder(radius, height):
+                return p.createVisualShape(
+                    p.GEOM_CYLINDER, radius=radius, length=height, rgbaColor=color, physicsClientId=self._client
+                )
+            case Sphere(radius):
+                return p.createVisualShape(p.GEOM_SPHERE, radius=radius, rgbaColor=color, physicsClientId=self._client)
+
+    def _add(
+        self, name: str, shape: Shape, X_WO: SE3, friction: float, mass: float, color: tuple[float, float, float, float]
+    ) -> int:
+        pose = pin.SE3ToXYZQUAT(X_WO)
+        body = p.createMultiBody(
+            mass,
+            self._collision_shape(shape),
+            self._visual_shape(shape, color),
+            list(pose[:3]),
+            list(pose[3:]),
+            physicsClientId=self._client,
+        )
+        p.changeDynamics(
+            body,
+            -1,
+            lateralFriction=friction,
+            rollingFriction=0.0,
+            spinningFriction=0.0,
+            restitution=0.0,
+            linearDamping=0.0,
+            angularDamping=0.0,
+            activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING,
+            physicsClientId=self._client,
+        )
+        self._names[body] = name
+        return body
+
+    def _add_room(self, scenario: Scenario) -> None:
+        floor = floor_height(scenario)
+        self._add(
+            "floor",
+            Box((4.0, 4.0, 0.1)),
+            SE3(np.eye(3), np.array([0.0, 0.0, floor - 0.05])),
+            FLOOR_FRICTION,
+            0.0,
+            (0.8, 0.8, 0.8, 1.0),
+        )
+        base = scenario.robot.X_WB.translation
+        height = float(base[2]) - floor
+        if height > 0.0:
+            centre = np.array([base[0], base[1], floor + height / 2])
+            pedestal = Box((PEDESTAL_SIZE, PEDESTAL_SIZE, height))
+            self._add("pedestal", pedestal, SE3(np.eye(3), centre), FLOOR_FRICTION, 0.0, (0.4, 0.4, 0.4, 1.0))
+        table = scenario.table
+        self._add("table", table.shape, table.X_WT, table.friction, 0.0, (0.75, 0.6, 0.45, 1.0))
+        for region in scenario.regions.values():
+            color = (0.7, 0.2, 0.2, 1.0) if region.kind == "dustpan" else (0.5, 0.55, 0.6, 1.0)
+            for shape, X_RP in parts(region):
+                self._add(region.name, shape, region.X_WR * X_RP, region.friction, 0.0, color)
+        for fixture in scenario.fixtures.values():
+            self._add(fixture.name, fixture.shape, fixture.X_WO, fixture.friction, 0.0, fixture.color)
+
+    def _add_body(self, name: str) -> int:
+        body = self.scenario.bodies[name]
+        identity = self._add(name, body.shape, body.X_WO, body.friction, body.mass, body.color)
+        if body.contact_stiffness is not None and body.contact_damping is not None:
+            p.changeDynamics(
+                identity,
+                -1,
+                contactStiffness=body.contact_stiffness,
+                contactDamping=body.contact_damping,
+                physicsClientId=self._client,
+            )
+        return identity
+
+    def _add_robot(self, scenario: Scenario, robot: RobotModel) -> None:
+        pose = pin.SE3ToXYZQUAT(scenario.robot.X_WB)
+        with resolved_urdf(robot) as path:
+            self._robot = p.loadURDF(
+                path,
+                list(pose[:3]),
+                list(pose[3:]),
+                useFixedBase=True,
+                flags=p.URDF_USE_INERTIA_FROM_FILE,
+                physicsClientId=self._client,
+            )
+        joints = range(p.getNumJoints(self._robot, physicsClientId=self._client))
+        info = [p.getJointInfo(self._robot, j, physicsClientId=self._client) for j in joints]
+        index = {entry[1].decode(): entry[0] for entry in info}
+        self._link_names = {-1: "link_0"} | {entry[0]: entry[12].decode() for entry in info}
+        self._arm_joints = [index[f"joint_{i}"] for i in range(1, 8)]
+        self._finger_joints = [index["finger_left_slide"], index["finger_right_slide"]]
+        self._sensor_joint = index["wrist_sensor"]
+        self._tcp_link = index["tcp_mount"]
+        self._tau = np.zeros(7)
+        self._tau_max = robot.tau_max
+        self._max_grip_force = robot.gripper.max_force
+        self._max_grip_speed = robot.gripper.max_speed
+
+        for link in self._link_names:
+            p.changeDynamics(
+                self._robot, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, physicsClientId=self._client
+            )
+        for finger in self._finger_joints:
+            p.changeDynamics(
+                self._robot, finger, lateralFriction=robot.gripper.pad_friction, physicsClientId=self._client
+            )
+        p.setJointMotorControlArray(
+            self._robot, self._arm_joints, p.VELOCITY_CONTROL, forces=[0.0] * 7, physicsClientId=self._client
+        )
+        for joint, angle in zip(self._arm_joints, scenario.robot.q0, strict=True):
+            p.resetJointState(self._robot, joint, float(angle), physicsClientId=self._client)
+        for finger in self._finger_joints:
+            p.resetJointState(self._robot, finger, robot.gripper.stroke / 2, physicsClientId=self._client)
+        gear = p.createConstraint(
+            self._robot,
+            self._finger_joints[0],
+            self._robot,
+            self._finger_joints[1],
+            p.JOINT_GEAR,
+            [0, 1, 0],
+            [0, 0, 0],
+            [0, 0, 0],
+            physicsClientId=self._client,
+        )
+        p.changeConstraint(gear, gearRatio=-1, erp=0.2, maxForce=GEAR_FORCE, physicsClientId=self._client)
+        p.enableJointForceTorqueSensor(self._robot, self._sensor_joint, True, physicsClientId=self._client)
+        self.apply(Command(np.zeros(7), GripCommand(0.0, robot.gripper.max_force)))
