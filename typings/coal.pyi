@@ -1,0 +1,5 @@
+"""Coal ships no stubs: everything is Any."""
+
+from typing import Any
+
+def __getattr__(name: str) -> Any: ...
