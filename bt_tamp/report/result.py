@@ -1,0 +1,87 @@
+"""How a run ended, in figures: what `result.json` holds."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+Outcome = Literal["goal_reached", "planned", "proven_infeasible", "no_plan", "gave_up", "interrupted"]
+
+EXIT_CODES: Mapping[Outcome, int] = {
+    "goal_reached": 0,
+    "planned": 0,
+    "proven_infeasible": 10,
+    "no_plan": 11,
+    "gave_up": 12,
+    "interrupted": 130,
+}
+"""Exit code of the command line by outcome. Wrong input is 2."""
+
+
+@dataclass(frozen=True)
+class UnintendedContact:
+    """Two things that touched with more than 1 N though the running phase did not declare it.
+
+    t: simulated seconds at which it began; force_n: its peak in N; action and phase: what ran then.
+    """
+
+    t: float
+    first: str
+    second: str
+    force_n: float
+    action: str
+    phase: str
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """One run. Field names are the keys of `result.json`.
+
+    goal: literal → does it hold at the end. plan: actions of the last plan; executed: actions that
+    were done, in order. learned: sentences. places: where each movable body lies at the end (a
+    region's name, "table", "hand" or "floor"). reason: why it ended so, one sentence.
+    planning_cpu_s counts all rounds and re-refinements, children included. robot_s is simulated,
+    wall_s real time. energy_j is ∫|τ·q̇|dt. reproducible: no wall-clock watchdog cut anything short.
+    """
+
+    scenario: str
+    seed: int
+    outcome: Outcome
+    reason: str
+    goal: Mapping[str, bool]
+    plan: tuple[str, ...] = ()
+    executed: tuple[str, ...] = ()
+    learned: tuple[str, ...] = ()
+    places: Mapping[str, str] = field(default_factory=dict)
+    rounds: int = 0
+    replans: int = 0
+    planning_cpu_s: float = 0.0
+    planning_wall_s: float = 0.0
+    robot_s: float = 0.0
+    wall_s: float = 0.0
+    peak_contact_force_n: float = 0.0
+    torque_limit_violations: int = 0
+    unintended_contacts: tuple[UnintendedContact, ...] = ()
+    peak_rss_mb: float = 0.0
+    energy_j: float = 0.0
+    reproducible: bool = True
+
+    @property
+    def exit_code(self) -> int:
+        return EXIT_CODES[self.outcome]
+
+    def to_json(self) -> str:
+        """The result as indented JSON text."""
+        return json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n"
+
+    @staticmethod
+    def from_json(text: str) -> "RunResult":
+        """Read what `to_json` wrote. Raises ValueError for anything else."""
+        try:
+            data: dict[str, Any] = json.loads(text)
+            data["unintended_contacts"] = tuple(UnintendedContact(**c) for c in data["unintended_contacts"])
+            for key in ("plan", "executed", "learned"):
+                data[key] = tuple(data[key])
+            return RunResult(**data)
+        except (TypeError, KeyError, AttributeError) as error:
+            raise ValueError(f"not a run's result: {error}") from None
