@@ -145,7 +145,7 @@ class RobotModel:
         """The same robot with a rigid load in the hand: mass in kg, centre (3,) in m and rotational
         inertia (3,3) in kg m² about that centre, in G."""
         loaded = RobotModel.__new__(RobotModel)
-        loaded.__dict__.update({k: v for k, v in self.__dict__.items()})
+        loaded.__dict__.update(self.__dict__)
         loaded.model = pin.Model(self.model)
         frame = loaded.model.frames[self.tcp_id]
         load = pin.Inertia(mass, com_G, inertia_G)

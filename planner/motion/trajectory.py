@@ -22,7 +22,8 @@ class Trajectory:
         n = len(self.times)
         if n < 1 or self.q.shape != (n, 7) or self.v.shape != (n, 7):
             raise ValueError(
-                f"trajectory shapes: times {self.times.shape}, q {self.q.shape}, v {self.v.shape}, expected (n,), (n,7), (n,7)"
+                f"trajectory shapes: times {self.times.shape}, q {self.q.shape}, v {self.v.shape}, "
+                "expected (n,), (n, 7), (n, 7)"
             )
         if np.any(np.diff(self.times) <= 0):
             raise ValueError("trajectory times must rise strictly")
