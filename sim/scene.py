@@ -13,6 +13,9 @@ from pinocchio import SE3
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, Shape, extents
 
+PEDESTAL_SIZE = 0.24
+"""Side in metres of the square block under a robot whose base is above the floor."""
+
 
 @dataclass(frozen=True)
 class Held:
@@ -70,6 +73,17 @@ def floor_height(scenario: Scenario) -> float:
     bottoms += [_bottom(Box(region.size), region.X_WR) for region in scenario.regions.values()]
     bottoms += [_bottom(fixture.shape, fixture.X_WO) for fixture in scenario.fixtures.values()]
     return min(bottoms)
+
+
+def pedestal(scenario: Scenario) -> tuple[Box, SE3] | None:
+    """The block between the floor and the robot's base with its pose in W; None if the base stands on the floor."""
+    base = scenario.robot.X_WB.translation
+    floor = floor_height(scenario)
+    height = float(base[2]) - floor
+    if height <= 0.0:
+        return None
+    centre = np.array([base[0], base[1], floor + height / 2])
+    return Box((PEDESTAL_SIZE, PEDESTAL_SIZE, height)), SE3(np.eye(3), centre)
 
 
 def half_height(shape: Shape, R_WO: np.ndarray) -> float:
