@@ -81,6 +81,8 @@ class BulletPlant:
         arm = p.getJointStates(self._robot, self._arm_joints, physicsClientId=self._client)
         fingers = p.getJointStates(self._robot, self._finger_joints, physicsClientId=self._client)
         sensor = p.getJointState(self._robot, self._sensor_joint, physicsClientId=self._client)[2]
+        # PyBullet reports the joint's reaction about the child link's centre of mass, on the child.
+        force = -np.array(sensor[:3])
         poses, velocities = {}, {}
         for name, body in self._bodies.items():
             position, quaternion = p.getBasePositionAndOrientation(body, physicsClientId=self._client)
@@ -95,7 +97,7 @@ class BulletPlant:
             opening=fingers[0][0] + fingers[1][0],
             opening_velocity=fingers[0][1] + fingers[1][1],
             grip_force=(abs(fingers[0][3]) + abs(fingers[1][3])) / 2,
-            wrist=Wrench(-np.array(sensor[:3]), -np.array(sensor[3:])),
+            wrist=Wrench(force, -np.array(sensor[3:]) + np.cross(self._hand_centre, force)),
             poses=poses,
             velocities=velocities,
         )
@@ -258,6 +260,8 @@ class BulletPlant:
         self._finger_joints = [index["finger_left_slide"], index["finger_right_slide"]]
         self._sensor_joint = index["wrist_sensor"]
         self._tcp_link = index["tcp_mount"]
+        hand = p.getDynamicsInfo(self._robot, self._sensor_joint, physicsClientId=self._client)
+        self._hand_centre = np.array(hand[3])
         self._tau = np.zeros(7)
         self._tau_max = robot.tau_max
         self._max_grip_force = robot.gripper.max_force
