@@ -1,0 +1,354 @@
+"""The format of scene files, version 1.
+
+SI units; angles in degrees, and only in keys that end in `_deg`. Frames: W is the world, z up.
+Sizes are full extents. Unknown keys are errors. `json_schema` gives the same as JSON Schema.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from scenarios.document import Document, KeyPath
+from scenarios.errors import SceneInvalid
+from scenarios.names import known
+from scenarios.robots import ROBOTS
+
+VERSION = 1
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Coordinate = Annotated[Number, Field(ge=-10, le=10)]
+Extent = Annotated[Number, Field(ge=0.001, le=10)]
+Degrees = Annotated[Number, Field(ge=-360, le=360)]
+Triple = Field(min_length=3, max_length=3)
+Position = Annotated[list[Coordinate], Triple]
+Size = Annotated[list[Extent], Triple]
+Angles = Annotated[list[Degrees], Triple]
+Mass = Annotated[Number, Field(gt=0, le=100, description="Mass in kg.")]
+Color = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}([0-9a-fA-F]{2})?$", description="#rrggbb or #rrggbbaa.")]
+Friction = Annotated[
+    Number,
+    Field(
+        ge=0,
+        le=10,
+        description="Coulomb friction coefficient of the surface. The coefficient of two surfaces in contact is the "
+        "product of both: an object of 0.5 on a table of 0.6 slides at 0.3.",
+    ),
+]
+Home = Annotated[str | None, Field(description="The region where `clear-table` puts it; without: any bin.")]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _keys_are_known(cls, data: Any) -> Any:
+        if isinstance(data, Mapping):
+            for key in data:
+                if key not in cls.model_fields:
+                    raise _problem(str(key), f"unknown key, {known(str(key), cls.model_fields)}")
+        return data
+
+
+class Pose(_Part):
+    """A frame in W."""
+
+    xyz: Position = Field(description="Origin in W, metres.")
+    rpy_deg: Angles = Field(
+        default=[0.0, 0.0, 0.0],
+        description="Turn about W's fixed axes x, then y, then z (roll, pitch, yaw), in degrees.",
+    )
+
+
+class LevelPose(Pose):
+    """A frame in W whose z points up: roll and pitch are zero."""
+
+    @model_validator(mode="after")
+    def _is_level(self) -> "LevelPose":
+        if any(self.rpy_deg[:2]):
+            raise _problem("rpy_deg", f"roll and pitch are {self.rpy_deg[:2]}, expected zero: it stands level")
+        return self
+
+
+class PoseOn(_Part):
+    """Upright on a surface: the object's bottom rests on the table's top or the region's floor."""
+
+    on: str = Field(description="`table`, or a region's name.")
+    xy: Annotated[list[Coordinate], Field(min_length=2, max_length=2)] = Field(description="Origin in W, metres.")
+    yaw_deg: Degrees = Field(default=0.0, description="Turn about W's z in degrees.")
+
+
+def _pose_kind(data: Any) -> str:
+    is_on = "on" in data if isinstance(data, Mapping) else isinstance(data, PoseOn)
+    return "<on>" if is_on else "<xyz>"
+
+
+BodyPose = Annotated[Annotated[PoseOn, Tag("<on>")] | Annotated[Pose, Tag("<xyz>")], Discriminator(_pose_kind)]
+
+
+class Round(_Part):
+    """A cylinder along its own z axis."""
+
+    radius: Extent
+    height: Extent
+
+
+class Ball(_Part):
+    """A sphere."""
+
+    radius: Extent
+
+
+class Solid(_Part):
+    """One of box, cylinder and sphere. The origin is the geometric centre."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
+
+    box: Size | None = Field(default=None, description="Full extents along the object's x, y and z in metres.")
+    cylinder: Round | None = Field(default=None, description="Radius and full height along the object's z in metres.")
+    sphere: Ball | None = Field(default=None, description="Radius in metres.")
+
+    @model_validator(mode="after")
+    def _is_one(self) -> "Solid":
+        given = [key for key in type(self).model_fields if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise _problem("", f"{len(given)} shapes are given, expected one of box, cylinder, sphere")
+        return self
+
+
+class Robot(_Part):
+    """The arm, where its base stands and how it starts."""
+
+    model: str = Field(default="iiwa14_wsg50", description="Name of the robot's model.")
+    base: Pose = Field(default=Pose(xyz=[0.0, 0.0, 0.0]), description="The base frame in W.")
+    q0_deg: Annotated[list[Degrees], Field(min_length=7, max_length=7)] = Field(
+        default=[0.0, 20.0, 0.0, -80.0, 0.0, 80.0, 0.0], description="Start configuration, joint angles in degrees."
+    )
+
+    @model_validator(mode="after")
+    def _is_known_and_within_limits(self) -> "Robot":
+        if self.model not in ROBOTS:
+            raise _problem("model", f"unknown robot {self.model!r}, {known(self.model, ROBOTS)}")
+        for i, (q, limit) in enumerate(zip(self.q0_deg, ROBOTS[self.model].q_max_deg, strict=True)):
+            if abs(q) > limit:
+                raise _problem("q0_deg", f"joint {i + 1} is at {q}°, expected at most ±{limit:g}°")
+        return self
+
+
+class Table(_Part):
+    """The table's plate."""
+
+    size: Size = Field(description="Full extents in metres; the last is the plate's thickness.")
+    pose: LevelPose = Field(description="Pose of the plate's geometric centre.")
+    friction: Friction = 0.5
+
+
+class Region(_Part):
+    """A container: a bin has four walls; a dustpan has three, and is open at one side.
+
+    A dustpan with a ramp stands on the table, the bottom edge of its open side flush with the
+    table's top; without a ramp it is a tray beside the table, its rim below the table's edge.
+    """
+
+    kind: Literal["bin", "dustpan"]
+    size: Size = Field(description="Full OUTER extents in metres, floor and walls included.")
+    wall: Extent = Field(default=0.01, description="Thickness of walls and floor in metres.")
+    pose: LevelPose = Field(description="Pose of the outer box's geometric centre.")
+    open_side: Literal["+x", "-x", "+y", "-y"] | None = Field(
+        default=None, description="The side without a wall, in the region's own frame. Dustpans only."
+    )
+    ramp_deg: Annotated[Number, Field(ge=1, le=45)] | None = Field(
+        default=None, description="Slope of the ramp inside the open side in degrees. Without: no ramp."
+    )
+    friction: Friction = 0.5
+
+    @model_validator(mode="after")
+    def _is_a_container(self) -> "Region":
+        if min(self.size[:2]) <= 2 * self.wall or self.size[2] <= self.wall:
+            raise _problem("size", f"{self.size} leaves no space inside walls of {self.wall} m, expected more")
+        if self.kind == "dustpan" and self.open_side is None:
+            raise _problem("open_side", "is missing, expected one of +x, -x, +y, -y: a dustpan has an open side")
+        if self.kind == "bin" and self.open_side is not None:
+            raise _problem("open_side", "a bin has four walls, expected none (or kind dustpan)")
+        if self.ramp_deg is None:
+            return self
+        if self.open_side is None:
+            raise _problem("ramp_deg", "a bin has no ramp, expected none (or kind dustpan)")
+        depth = self.size["xy".index(self.open_side[1])] - self.wall
+        ramp = self.wall / np.tan(np.radians(self.ramp_deg))
+        if ramp >= depth:
+            raise _problem("ramp_deg", f"the ramp is {ramp:.3f} m long, expected less than the inside's {depth:.3f} m")
+        return self
+
+
+class Fixed(_Part):
+    """Something that never moves and is in the way."""
+
+    shape: Solid
+    pose: BodyPose
+    friction: Friction = 0.5
+    color: Color = "#8a8f98"
+
+
+class Noise(_Part):
+    """Uniform noise on the start pose, for every seed but 0: one stream for each object, named by seed and name."""
+
+    xy: Annotated[Number, Field(ge=0, le=1)] = Field(default=0.0, description="Up to ± this in W's x and y, metres.")
+    yaw_deg: Annotated[Number, Field(ge=0, le=180)] = Field(
+        default=0.0, description="Up to ± this about W's z through the object's origin, degrees."
+    )
+
+
+class Thing(_Part):
+    """An object to be cleared away. It is a crumb if its largest extent is below the gripper's smallest grasp."""
+
+    shape: Solid
+    mass: Mass
+    friction: Friction = 0.5
+    color: Color = "#b8b2a7"
+    pose: BodyPose
+    noise: Noise | None = None
+    home: Home = None
+
+
+class Tool(_Part):
+    """A movable thing that the robot works with. A sponge is a soft box."""
+
+    kind: Literal["sponge"]
+    shape: Solid
+    mass: Mass
+    friction: Friction = 0.5
+    contact_stiffness: Annotated[Number, Field(gt=0, le=1e6)] = Field(
+        default=2000.0, description="Stiffness of each contact point in N/m."
+    )
+    contact_damping: Annotated[Number, Field(ge=0, le=1e5)] = Field(
+        default=20.0, description="Damping of each contact point in Ns/m."
+    )
+    color: Color = "#f2c230"
+    pose: BodyPose
+    noise: Noise | None = None
+    home: Home = None
+
+    @model_validator(mode="after")
+    def _is_a_box(self) -> "Tool":
+        if self.shape.box is None:
+            raise _problem("shape", "a sponge is a box, expected {box: [x, y, z]}")
+        return self
+
+
+class SceneFile(_Part):
+    """A scene: what stands where, and what must become of it.
+
+    Names match [a-z][a-z0-9_-]*, are given once in the whole file, and are neither PDDL keywords
+    nor names of the robot's parts.
+    """
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(title="bt-tamp scene, version 1")
+
+    version: Literal[1]
+    name: str = Field(description="The scene's name.")
+    robot: Robot
+    table: Table
+    regions: dict[str, Region] = Field(default={}, max_length=50)
+    fixed: dict[str, Fixed] = Field(default={}, max_length=200)
+    objects: dict[str, Thing] = Field(max_length=200)
+    tools: dict[str, Tool] = Field(default={}, max_length=10)
+    goal: str = Field(
+        description="A PDDL conjunction of positive literals: (in_bin OBJECT PLACE) lies in that bin or dustpan, or on "
+        "the table; (put_away OBJECT) lies in some bin; (holding OBJECT); (hand_empty). Or `clear-table`: every crumb "
+        "in the dustpan, every other object and each tool in its `home`."
+    )
+
+
+def json_schema() -> dict[str, Any]:
+    """The format as JSON Schema."""
+    return SceneFile.model_json_schema()
+
+
+def validate_document(document: Document) -> SceneFile:
+    """Hold plain data against the format. Raises SceneInvalid with the first problem and how many more there are."""
+    data = document.data
+    if not isinstance(data, dict):
+        raise SceneInvalid(f"expected a scene (a mapping), got {_shown(data)}", document.file, document.place(()))
+    if "version" not in data:
+        message = f"missing key 'version', expected version: {VERSION}"
+        raise SceneInvalid(message, document.file, document.place(()))
+    if data["version"] != VERSION or isinstance(data["version"], bool):
+        message = f"version is {_shown(data['version'])}, expected {VERSION}"
+        raise SceneInvalid(message, document.file, document.place(("version",)))
+    try:
+        return SceneFile.model_validate(data)
+    except ValidationError as error:
+        problems = error.errors(include_url=False)
+        first = min(problems, key=lambda problem: document.line(_path(problem)))
+        raise invalid(document, _path(first), _message(first), len(problems) - 1) from None
+
+
+def invalid(document: Document, path: KeyPath, message: str, more: int = 0) -> SceneInvalid:
+    """The error for one problem at a key path, with the number of further ones."""
+    rest = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
+    return SceneInvalid(message + rest, document.file, document.place(path))
+
+
+def _problem(key: str, message: str) -> PydanticCustomError:
+    return PydanticCustomError("scene", "{message}", {"message": message, "key": key})
+
+
+def _path(error: ErrorDetails) -> KeyPath:
+    path = tuple(key for key in error["loc"] if not (isinstance(key, str) and key.startswith("<")))
+    if error["type"] == "missing":
+        return path[:-1]
+    key = error.get("ctx", {}).get("key", "")
+    return (*path, key) if key else path
+
+
+def _message(error: ErrorDetails) -> str:
+    kind, context = error["type"], error.get("ctx", {})
+    got = f"got {_shown(error['input'])}"
+    match kind:
+        case "scene":
+            return str(context["message"])
+        case "missing":
+            return f"missing key {error['loc'][-1]!r}, expected it here"
+        case "float_type" | "int_type":
+            return f"expected a number, {got}"
+        case "finite_number":
+            return f"expected a finite number, {got}"
+        case "greater_than_equal" | "greater_than" | "less_than_equal" | "less_than":
+            words = {"greater_than_equal": "of at least", "greater_than": "above", "less_than": "below"}
+            bound = context.get("ge", context.get("gt", context.get("le", context.get("lt"))))
+            return f"expected a number {words.get(kind, 'of at most')} {bound:g}, {got}"
+        case "too_short" | "too_long" if isinstance(error["input"], list):
+            count = context.get("min_length", context.get("max_length"))
+            return f"expected {count} numbers, got {len(error['input'])}"
+        case "too_long":
+            return f"expected at most {context['max_length']} entries, got {len(error['input'])}"
+        case "literal_error":
+            return f"expected {context['expected']}, {got}"
+        case "list_type":
+            return f"expected a list of numbers, {got}"
+        case "model_type" | "dict_type" | "model_attributes_type":
+            return f"expected a mapping, {got}"
+        case "string_type":
+            return f"expected text, {got}"
+        case "string_pattern_mismatch":
+            return f"expected text like #3355aa, {got}"
+    return f"{error['msg']}, {got}"
+
+
+def _shown(value: Any) -> str:
+    match value:
+        case None:
+            return "nothing"
+        case dict():
+            return "a mapping"
+        case list():
+            return "a list"
+        case bool():
+            return str(value).lower()
+        case str():
+            return repr(value if len(value) <= 40 else f"{value[:39]}…")
+    return f"{value:g}" if isinstance(value, float) else str(value)
