@@ -45,11 +45,9 @@ def reference_problems(file: schema.SceneFile) -> Iterator[Problem]:
     surfaces = {TABLE, *file.regions}
     for group in ("fixed", "objects", "tools"):
         for name, thing in getattr(file, group).items():
-            if isinstance(thing.pose, schema.PoseOn) and thing.pose.on not in surfaces:
-                yield (
-                    (group, name, "pose", "on"),
-                    f"unknown surface {thing.pose.on!r}, {known(thing.pose.on, surfaces)}",
-                )
+            on = thing.pose.on if isinstance(thing.pose, schema.PoseOn) else TABLE
+            if on not in surfaces:
+                yield (group, name, "pose", "on"), f"unknown surface {on!r}, {known(on, surfaces)}"
             home = getattr(thing, "home", None)
             if home is not None and home not in file.regions:
                 yield (group, name, "home"), f"unknown region {home!r}, {known(home, file.regions)}"

@@ -38,7 +38,7 @@ class SceneMalformed(SceneError):
 
 
 class SceneInvalid(SceneError):
-    """Not a scene of this version, or bodies that overlap, float or lie off the table, or a goal that makes no sense."""
+    """Not a scene of this version, or one in which things overlap, float or hang over, or a goal without sense."""
 
 
 def one_line(text: str) -> str:

@@ -1,4 +1,4 @@
-"""What a scene file may assume of a robot, by model name. `sim` owns the robot; a test holds both against each other."""
+"""What a scene file may assume of a robot, by model name. `sim` owns the robot; a test holds the two together."""
 
 from dataclasses import dataclass
 
