@@ -14,7 +14,7 @@ import numpy as np
 from planner.failure import RefinementFailure
 from planner.motion.trajectory import Trajectory
 from planner.task.symbols import GroundAction
-from sim.scene import SceneState
+from sim.scene import Held, SceneState
 
 Pair = frozenset[str]
 """Two names that may touch: robot links, bodies, fixtures, regions or the table."""
@@ -41,16 +41,20 @@ class Phase:
     """One stretch of an action: what the arm and the fingers do, and which contacts that may make.
 
     kind "move": follow the trajectory in joint space. "approach": the same along a straight line
-    near contact, `allowed` pairs may touch. "grip": hold still and drive the fingers to `opening`
-    (None: close until the object resists). "touch": lower along the trajectory until contact with
-    `press.force`. "slide": follow the trajectory pressed with `press`. "lift": leave contact upwards.
+    near contact. "open" and "close": hold still and drive the fingers apart to `opening`, or together
+    until an object resists. "touch": lower along the trajectory until contact with `press.force`.
+    "slide": follow the trajectory pressed with `press`. `allowed` pairs may touch meanwhile.
+
+    `held` and `opening` (m) are what the hand holds and how far it is open when the phase begins
+    ("open": the opening it ends with).
     """
 
     name: str
-    kind: Literal["move", "approach", "grip", "touch", "slide", "lift"]
+    kind: Literal["move", "approach", "open", "close", "touch", "slide"]
     trajectory: Trajectory
+    opening: float
+    held: Held | None = None
     allowed: frozenset[Pair] = frozenset()
-    opening: float | None = None
     press: Press | None = None
 
 

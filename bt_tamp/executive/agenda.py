@@ -1,0 +1,145 @@
+"""The plan in force: its steps, which one runs, and the tree `act` that carries out the rest."""
+
+from collections.abc import Callable, Mapping
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Sequence
+
+from bt_tamp.executive.validity import resume_at, still_good_while
+from planner.refinement import Refinement
+from planner.task.symbols import Fact, GroundAction, TaskPlan
+from sim.scene import SceneState
+from skills.context import ActionRun, SkillContext
+from skills.motions import sequence
+from skills.skill import Skill
+
+
+class Agenda:
+    """What is to be done, and how far it has come.
+
+    `facts` states a believed scene in the planner's predicates. `rebuilt` is called whenever `act`
+    has new children.
+    """
+
+    def __init__(
+        self,
+        goal: frozenset[Fact],
+        skills: Mapping[str, Skill],
+        facts: Callable[[SceneState], frozenset[Fact]],
+        rebuilt: Callable[[str], None],
+    ) -> None:
+        self.goal = goal
+        self.facts = facts
+        self.act = Sequence("act", memory=True, children=[Waiting()])
+        self.plan: TaskPlan | None = None
+        self.executed: list[GroundAction] = []
+        self.is_between_actions = True
+        self._skills = skills
+        self._rebuilt = rebuilt
+        self._refinements: tuple[Refinement, ...] = ()
+        self._running = 0
+
+    @property
+    def running(self) -> GroundAction | None:
+        """The action that is being carried out, None between actions and without a plan."""
+        if self.plan is None or self.is_between_actions or self._running >= len(self.plan.steps):
+            return None
+        return self.plan.steps[self._running].action
+
+    def adopt(self, plan: TaskPlan, refinements: tuple[Refinement, ...], context: SkillContext, why: str) -> None:
+        """Put a new plan in force: the old tree is stopped, then replaced."""
+        self.plan, self._refinements = plan, refinements
+        self._build_from(0, context, why)
+
+    def drop(self) -> None:
+        """Put the plan out of force and stop what runs."""
+        self.plan = None
+        self.act.stop(Status.INVALID)
+        self.is_between_actions = True
+
+    def review(self, context: SkillContext) -> str | None:
+        """Why the plan is no longer in force, or None; skips and redoes steps as the observed facts ask."""
+        if context.failure is not None:
+            return context.failure.reason
+        if self.plan is None:
+            return "there is no plan yet"
+        facts = self.facts(context.scene)
+        if not self.is_between_actions:
+            good = still_good_while(self.plan, self._running, facts)
+            return None if good else f"after {self.running} the rest of the plan would no longer apply"
+        k = resume_at(self.plan, facts)
+        if k is None:
+            return "what is left of the plan no longer leads to the goal"
+        if k != self._running:
+            self._build_from(k, context, "skipped" if k > self._running else "redone")
+        return None
+
+    def begin(self) -> None:
+        """An action of the plan has started."""
+        self.is_between_actions = False
+
+    def complete(self) -> None:
+        """The running action is done."""
+        if self.plan is not None:
+            self.executed.append(self.plan.steps[self._running].action)
+        self._running += 1
+        self.is_between_actions = True
+
+    def _build_from(self, k: int, context: SkillContext, why: str) -> None:
+        assert self.plan is not None
+        self.act.stop(Status.INVALID)
+        self.act.remove_all_children()
+        self._running = k
+        self.is_between_actions = True
+        for index in range(k, len(self.plan.steps)):
+            action = self.plan.steps[index].action
+            run = ActionRun(action, self._refinements[index])
+            subtree = self._skills[action.name].subtree(run, context)
+            name, subtree.name = subtree.name, "do"
+            self.act.add_child(sequence(name, Begin(self, action, context), subtree, Complete(self, action, context)))
+        self.act.add_child(Waiting())
+        self._rebuilt(why)
+
+
+class Begin(Behaviour):
+    """Marks the start of an action."""
+
+    def __init__(self, agenda: Agenda, action: GroundAction, context: SkillContext) -> None:
+        super().__init__("begin")
+        self._agenda, self._action, self._context = agenda, action, context
+
+    def update(self) -> Status:
+        self._agenda.begin()
+        self._context.report("action_started", action=str(self._action))
+        return Status.SUCCESS
+
+
+class Complete(Behaviour):
+    """Marks the end of an action, and lets a tick pass so that the rest of the plan is looked at before it goes on."""
+
+    def __init__(self, agenda: Agenda, action: GroundAction, context: SkillContext) -> None:
+        super().__init__("complete")
+        self._agenda, self._action, self._context = agenda, action, context
+        self._marked = False
+
+    def initialise(self) -> None:
+        self._marked = False
+
+    def update(self) -> Status:
+        if self._marked:
+            return Status.SUCCESS
+        self._marked = True
+        self._agenda.complete()
+        self._context.report("action_done", action=str(self._action))
+        return Status.RUNNING
+
+
+class Waiting(Behaviour):
+    """Nothing left to do: the arm holds while the goal is looked at."""
+
+    def __init__(self) -> None:
+        super().__init__("wait")
+
+    def update(self) -> Status:
+        return Status.RUNNING

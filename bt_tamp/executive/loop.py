@@ -1,0 +1,170 @@
+"""One run: observe, control, tick the tree, record, until the goal holds or nothing is left to try."""
+
+import resource
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from py_trees.common import Status
+from py_trees.trees import BehaviourTree
+
+from bt_tamp.executive.audit import ContactAudit
+from bt_tamp.executive.build import CONTROL_EVERY, TREE_EVERY, Machine, build
+from bt_tamp.options import RunOptions
+from bt_tamp.report.recorder import RunRecorder
+from bt_tamp.report.result import Outcome, RunResult
+from bt_tamp.report.signals import Contact, Reference
+from planner.task.facts import place_of
+from scenarios.scenario import Scenario
+from sim.plant import Command
+
+AUDIT_EVERY = 5
+"""Control ticks between two looks at the true contacts: 100 Hz."""
+
+MAX_REPLANS = 25
+MAX_ACTIONS = 200
+
+
+@dataclass
+class Tally:
+    """What is counted while a run goes on."""
+
+    energy_j: float = 0.0
+    peak_force_n: float = 0.0
+    started: float = field(default_factory=time.perf_counter)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run ended and why, in a sentence."""
+
+    outcome: Outcome
+    reason: str
+
+
+def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder) -> RunResult:
+    """Plan and act until the goal is reached or given up. An interruption (Ctrl-C) ends the run with a result too.
+
+    Raises PddlError for hand-written PDDL that doesn't fit, ValueError for options that don't.
+    """
+    tally = Tally()
+    clock = [0.0]
+
+    def report(kind: str, **data: object) -> None:
+        _report(recorder, clock[0], kind, data)
+
+    machine = build(scenario, options, report, lambda why: recorder.tree(machine.mission.root, why))
+    audit = ContactAudit(machine.robot, scenario)
+    report("run_started", scene=scenario.name, seed=scenario.seed)
+    try:
+        ending = _run(machine, options, recorder, audit, tally, clock)
+    except KeyboardInterrupt:
+        ending = Ending("interrupted", "the run was interrupted")
+    result = _result(machine, scenario, ending, audit, tally)
+    recorder.tree(machine.mission.root, "end")
+    report("run_ended", outcome=result.outcome, sentence=result.reason)
+    recorder.finish(result)
+    machine.plant.close()
+    return result
+
+
+def _run(
+    machine: Machine, options: RunOptions, recorder: RunRecorder, audit: ContactAudit, tally: Tally, clock: list[float]
+) -> Ending:
+    plant, context = machine.plant, machine.context
+    tree = BehaviourTree(machine.mission.root)
+    tick = 0
+    while True:
+        observation = plant.observe()
+        clock[0] = observation.t
+        context.observation = observation
+        if tick % TREE_EVERY == 0:
+            context.scene = machine.belief.update(observation, context.grip.is_closing)
+            tree.tick()
+            ending = _ending(machine, options)
+            if ending:
+                return ending
+        tau = context.controller.update(observation)
+        plant.apply(Command(tau, context.grip.command(observation)))
+        _account(machine, recorder, audit, tally, tick)
+        for _ in range(CONTROL_EVERY):
+            plant.step()
+        tick += 1
+
+
+def _account(machine: Machine, recorder: RunRecorder, audit: ContactAudit, tally: Tally, tick: int) -> None:
+    context = machine.context
+    controller, observation = context.controller, context.observation
+    force = controller.contact_force if controller.contact else 0.0
+    tally.peak_force_n = max(tally.peak_force_n, force)
+    power = np.abs(observation.tau * observation.v).sum()
+    tally.energy_j += float(power) * CONTROL_EVERY * machine.plant.timestep
+    reference = controller.reference
+    wanted = reference.force if reference else 0.0
+    q_ref = reference.trajectory.at(controller.time_in_reference)[0] if reference else observation.q
+    p_ref = machine.robot.X_WG(q_ref).translation if wanted else None
+    recorder.sample(observation, Reference(q_ref, p_ref, wanted), force)
+    if tick % AUDIT_EVERY == 0:
+        contacts = machine.plant.contacts()
+        running = str(machine.agenda.running or "planning")
+        audit.look(observation.t, contacts, context, running)
+        if recorder.contacts_due(observation.t):
+            recorder.contacts(
+                observation.t,
+                [Contact(c.first, c.second, c.position, c.force) for c in contacts if audit.involves_robot(c, context)],
+            )
+
+
+def _ending(machine: Machine, options: RunOptions) -> Ending | None:
+    verdict = machine.planner.thinking.verdict
+    if machine.mission.goal.status == Status.SUCCESS:
+        machine.context.report("goal_reached")
+        return Ending("goal_reached", "every literal of the goal holds")
+    if verdict is not None:
+        return Ending("proven_infeasible" if verdict.verdict == "proven" else "no_plan", verdict.reason)
+    if machine.planner.thinking.plans > MAX_REPLANS:
+        return Ending("gave_up", f"{MAX_REPLANS} plans were made and none led to the goal")
+    if len(machine.agenda.executed) > MAX_ACTIONS:
+        return Ending("gave_up", f"{MAX_ACTIONS} actions were carried out and the goal still does not hold")
+    if machine.context.observation.t > options.max_sim_time:
+        return Ending("gave_up", f"{options.max_sim_time:g} s of simulated time have passed")
+    return None
+
+
+def _result(machine: Machine, scenario: Scenario, ending: Ending, audit: ContactAudit, tally: Tally) -> RunResult:
+    context, agenda, thinking = machine.context, machine.agenda, machine.planner.thinking
+    known = agenda.facts(context.scene)
+    held = context.scene.held
+    places = {name: place_of(context.scene, name) or "floor" for name in scenario.bodies}
+    if held is not None:
+        places[held.name] = "hand"
+    return RunResult(
+        scenario=scenario.name,
+        seed=scenario.seed,
+        outcome=ending.outcome,
+        reason=ending.reason,
+        goal={str(fact): fact in known for fact in sorted(agenda.goal)},
+        plan=tuple(str(action) for action in agenda.plan.actions) if agenda.plan else (),
+        executed=tuple(str(action) for action in agenda.executed),
+        learned=tuple(machine.planner.search.learned.sentences()),
+        places=places,
+        rounds=thinking.rounds,
+        replans=max(0, thinking.plans - 1),
+        planning_cpu_s=thinking.cpu_s,
+        planning_wall_s=thinking.wall_s,
+        robot_s=context.observation.t,
+        wall_s=time.perf_counter() - tally.started,
+        peak_contact_force_n=tally.peak_force_n,
+        torque_limit_violations=context.controller.torque_limit_violations,
+        unintended_contacts=tuple(audit.found),
+        peak_rss_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        energy_j=tally.energy_j,
+    )
+
+
+def _report(recorder: RunRecorder, t: float, kind: str, data: dict) -> None:
+    if kind == "round":
+        number = data["number"]
+        recorder.pddl(number, data.pop("domain"), data.pop("problem"))
+        recorder.plan(number, "\n".join(data["plan"]) if data["plan"] else "no plan")
+    recorder.event(kind, t, **data)

@@ -1,0 +1,97 @@
+"""The root tree: is the goal reached? If not: a plan in force, and the rest of it carried out.
+
+    mission                     Selector, memory=False
+    ├── goal reached?
+    └── pursue goal             Sequence, memory=False
+        ├── plan in force       Selector, memory=False
+        │   ├── plan still good?
+        │   └── plan            lift off if in contact, then plan
+        └── act                 one subtree per remaining action
+
+The outcome is judged by `goal reached?` alone; `act` coming to its end never ends the mission.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Selector, Sequence
+
+from bt_tamp.executive.agenda import Agenda
+from planner.task.symbols import Fact
+from skills.context import SkillContext
+from skills.motions import sequence
+
+GOAL_TIME = 0.5
+"""Seconds for which the goal must hold, everything at rest."""
+
+REST_SPEED = 0.01
+REST_TURN = 0.2
+"""m/s and rad/s below which a body is at rest."""
+
+
+@dataclass(frozen=True)
+class Mission:
+    """The tree's root, and the nodes that others look at."""
+
+    root: Behaviour
+    goal: Behaviour
+    act: Sequence
+
+
+def mission(agenda: Agenda, context: SkillContext, plan: Behaviour) -> Mission:
+    """The root tree around a planner node."""
+    goal = GoalReached(agenda, context)
+    act = agenda.act
+    in_force = Selector("plan in force", memory=False, children=[PlanStillGood(agenda, context), plan])
+    pursue = Sequence("pursue goal", memory=False, children=[in_force, act])
+    return Mission(Selector("mission", memory=False, children=[goal, pursue]), goal, act)
+
+
+class GoalReached(Behaviour):
+    """Do all goal literals hold, everything at rest, for half a second, the running action at its end?"""
+
+    def __init__(self, agenda: Agenda, context: SkillContext) -> None:
+        super().__init__("goal reached?")
+        self._agenda, self._context = agenda, context
+        self._since: float | None = None
+
+    def update(self) -> Status:
+        context = self._context
+        observation = context.observation
+        missing = self._agenda.goal - self._agenda.facts(context.scene)
+        moving = [name for name, V_WO in observation.velocities.items() if _moves(V_WO)]
+        if missing or moving or not self._agenda.is_between_actions:
+            self._since = None
+            self.feedback_message = _still_missing(missing)
+            return Status.FAILURE
+        if self._since is None:
+            self._since = observation.t
+        return Status.SUCCESS if observation.t - self._since >= GOAL_TIME else Status.FAILURE
+
+
+class PlanStillGood(Behaviour):
+    """Does the rest of the plan still lead to the goal from what is observed? If so, go on from the right step."""
+
+    def __init__(self, agenda: Agenda, context: SkillContext) -> None:
+        super().__init__("plan still good?")
+        self._agenda, self._context = agenda, context
+
+    def update(self) -> Status:
+        reason = self._agenda.review(self._context)
+        self.feedback_message = reason or ""
+        return Status.SUCCESS if reason is None else Status.FAILURE
+
+
+def planning(lift_off: Behaviour, plan: Behaviour) -> Behaviour:
+    """Leave contact first, then plan."""
+    return sequence("plan", lift_off, plan)
+
+
+def _moves(V_WO: np.ndarray) -> bool:
+    return bool(np.linalg.norm(V_WO[:3]) > REST_SPEED or np.linalg.norm(V_WO[3:]) > REST_TURN)
+
+
+def _still_missing(missing: frozenset[Fact]) -> str:
+    return "missing: " + ", ".join(str(fact) for fact in sorted(missing)) if missing else "waiting for rest"

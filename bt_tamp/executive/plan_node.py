@@ -1,0 +1,150 @@
+"""The planner node: feeds back what failed, plans from what is observed now, and rebuilds `act`."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_tamp.executive.agenda import Agenda
+from planner.failure import ExecutionFailure, RefinementFailure
+from planner.motion.trajectory import Trajectory
+from planner.refinement import Refinement, Work
+from planner.search_then_sample import NoPlan, SearchThenSample, Solution
+from planner.task.symbols import GroundAction
+from sim.scene import SceneState
+from skills.context import SkillContext
+from skills.control.reference import Reference
+
+COST = {"checks": 5e-6, "exact_checks": 2e-5, "ik": 1e-4, "expansions": 1e-4}
+"""Simulated seconds that one unit of planning work costs: the world does not stop while the robot thinks."""
+
+LIFT_HEIGHT = 0.05
+LIFT_TIME = 1.0
+
+
+@dataclass
+class Thinking:
+    """What planning has cost so far: CPU and wall seconds, rounds, replans."""
+
+    cpu_s: float = 0.0
+    wall_s: float = 0.0
+    rounds: int = 0
+    plans: int = 0
+    verdict: NoPlan | None = None
+    work: Work = field(default_factory=Work)
+    _started: tuple[float, float] = (0.0, 0.0)
+
+    def __enter__(self) -> "Thinking":
+        self._started = (time.process_time(), time.perf_counter())
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        cpu, wall = self._started
+        self.cpu_s += time.process_time() - cpu
+        self.wall_s += time.perf_counter() - wall
+
+    def simulated_cost(self) -> float:
+        """Simulated seconds that the work counted so far stands for."""
+        return sum(COST.get(what, 0.0) * amount for what, amount in self.work.counts.items())
+
+
+class Planner:
+    """Search-then-sample with its random stream and its costs: what the planner node and `refine` share."""
+
+    def __init__(self, search: SearchThenSample, seed: int) -> None:
+        self.search = search
+        self.thinking = Thinking()
+        self._rng = np.random.default_rng([seed, 7])
+
+    def plan(self, scene: SceneState, agenda: Agenda) -> Solution | NoPlan:
+        """A plan from the believed scene, refined whole, or why there is none."""
+        with self.thinking as thinking:
+            outcome = self.search.plan(scene, agenda.goal, self._rng, thinking.work)
+        thinking.rounds += outcome.rounds
+        thinking.plans += 1
+        return outcome
+
+    def refine(self, action: GroundAction, scene: SceneState) -> Refinement | RefinementFailure:
+        """One action refined again in the scene as it is believed now."""
+        with self.thinking as thinking:
+            return self.search.refine(action, scene, self._rng, thinking.work)
+
+
+class PlanNode(Behaviour):
+    """Plans, lets the simulated time that this costs pass, then puts the plan in force.
+
+    Fails when there is no plan; `planner.thinking.verdict` says why.
+    """
+
+    def __init__(self, planner: Planner, agenda: Agenda, context: SkillContext) -> None:
+        super().__init__("plan")
+        self._planner, self._agenda, self._context = planner, agenda, context
+        self._outcome: Solution | NoPlan | None = None
+        self._ready_at = 0.0
+        self._why = "planned"
+
+    def initialise(self) -> None:
+        self._outcome = None
+
+    def update(self) -> Status:
+        context, thinking = self._context, self._planner.thinking
+        if self._outcome is None:
+            self._take_in_failure()
+            before = thinking.simulated_cost()
+            self._outcome = self._planner.plan(context.scene, self._agenda)
+            self._ready_at = context.observation.t + thinking.simulated_cost() - before
+        if context.observation.t < self._ready_at:
+            return Status.RUNNING
+        if isinstance(self._outcome, NoPlan):
+            thinking.verdict = self._outcome
+            self.feedback_message = self._outcome.reason
+            return Status.FAILURE
+        solution = self._outcome
+        context.report(
+            "plan_installed",
+            actions=[str(action) for action in solution.plan.actions],
+            rounds=solution.rounds,
+            cpu_s=thinking.cpu_s,
+        )
+        self._agenda.adopt(solution.plan, solution.refinements, context, self._why)
+        self._why = "replanned"
+        return Status.SUCCESS
+
+    def _take_in_failure(self) -> None:
+        context = self._context
+        failure = context.failure
+        reason = self._agenda.review(context)
+        if failure is not None:
+            context.report("action_failed", action=str(failure.action), kind_=failure.kind, reason=failure.reason)
+            if isinstance(failure, (ExecutionFailure, RefinementFailure)):
+                self._planner.search.learn(failure, context.scene)
+        if self._planner.thinking.plans:
+            context.report("replan", reason=reason)
+        self._agenda.drop()
+        context.failure = None
+
+
+class LiftOff(Behaviour):
+    """Takes the arm out of contact, straight up, before it stands and thinks."""
+
+    def __init__(self, context: SkillContext, raise_arm: Callable[[np.ndarray, float], Trajectory]) -> None:
+        super().__init__("lift off")
+        self._context, self._raise_arm = context, raise_arm
+        self._lifting = False
+
+    def initialise(self) -> None:
+        context = self._context
+        self._lifting = context.controller.contact
+        if self._lifting:
+            trajectory = self._raise_arm(context.observation.q, LIFT_HEIGHT)
+            context.controller.follow(Reference(trajectory, "position"))
+        else:
+            context.controller.hold()
+
+    def update(self) -> Status:
+        if self._lifting and not self._context.controller.finished:
+            return Status.RUNNING
+        return Status.SUCCESS

@@ -1,0 +1,151 @@
+"""Antipodal grasps of convex primitives with a parallel gripper, best first.
+
+A grasp closes the fingers along one axis of the shape, where its extent fits the stroke, and
+comes in along any direction square to that axis. Cylinders and spheres are treated as boxes
+turned about their axes of symmetry.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+from pinocchio import SE3
+
+from scenarios.shapes import Box, Cylinder, Shape, Sphere, extents
+from sim.robot import Gripper
+
+CLEARANCE = 0.005
+"""Least gap in metres between each open finger and the object."""
+
+APPROACH_STEP = np.radians(15.0)
+MAX_DEPTH = 0.045
+MIN_DEPTH = 0.02
+TIP_CLEARANCE = 0.012
+"""Metres that the fingertips stay short of the object's far side, where what it lies on may be."""
+
+SIDE_STEP = 0.02
+JITTER = 0.02
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """The gripper's pose in the object's frame, as plain numbers, and the extent `width` between the fingers (m).
+
+    position (3,) in metres, quaternion (x, y, z, w): X_OG.
+    """
+
+    position: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+    width: float
+
+    @cached_property
+    def X_OG(self) -> SE3:
+        return pin.XYZQUATToSE3(np.array(self.position + self.quaternion))
+
+    @staticmethod
+    def at(X_OG: SE3, width: float) -> "Grasp":
+        """A grasp from a pose."""
+        numbers = [round(float(x), 9) for x in pin.SE3ToXYZQUAT(X_OG)]
+        return Grasp((numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4], numbers[5], numbers[6]), width)
+
+
+def open_width(gripper: Gripper, width: float) -> float:
+    """Opening in metres with which to come near an object of `width`: 15 mm to spare a side, if the stroke allows."""
+    return min(gripper.stroke, width + 0.03)
+
+
+def grasps(
+    shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.random.Generator
+) -> Iterator[Grasp]:
+    """Grasps of a shape that lies at X_WO, best first: from above, near the centre, away from the robot's base (3,).
+
+    Lazy; ends when all are given. `rng` breaks ties, so that another seed tries another order.
+    """
+    scored = []
+    for R_OF in _symmetries(shape):
+        for grasp in _box_grasps(extents(shape), R_OF, gripper):
+            R_WG = X_WO.rotation @ grasp.X_OG.rotation
+            scored.append((_score(grasp, R_WG, X_WO, base) + JITTER * rng.random(), len(scored), grasp))
+    scored.sort(key=lambda entry: (-entry[0], entry[1]))
+    for _, _, grasp in scored:
+        yield grasp
+
+
+def tool_grasps(
+    shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.random.Generator
+) -> Iterator[Grasp]:
+    """Grasps that leave a wiping tool's base and long faces free: from above, by the ends of its longest level axis."""
+    level = np.argsort(np.abs(X_WO.rotation[2]))[:2]
+    longest = int(max(level, key=lambda axis: extents(shape)[axis]))
+    for grasp in grasps(shape, X_WO, gripper, base, rng):
+        closing = grasp.X_OG.rotation[:, 1]
+        approach_W = X_WO.rotation @ grasp.X_OG.rotation[:, 2]
+        if abs(closing[longest]) > 0.99 and approach_W[2] < -0.99:
+            yield grasp
+
+
+def _score(grasp: Grasp, R_WG: np.ndarray, X_WO: SE3, base: np.ndarray) -> float:
+    approach = R_WG[:, 2]
+    outward = X_WO.translation - base
+    outward[2] = 0.0
+    outward = outward / max(float(np.linalg.norm(outward)), 1e-6)
+    offset = float(np.linalg.norm(np.cross(X_WO.rotation @ np.array(grasp.position), approach)))
+    return float(-approach[2] + 0.5 * approach @ outward) - 4.0 * offset
+
+
+def _symmetries(shape: Shape) -> list[np.ndarray]:
+    """Rotations (3,3) of the bounding box that the shape fills equally well."""
+    about_z = [pin.rpy.rpyToMatrix(0.0, 0.0, a) for a in np.radians(np.arange(0.0, 90.0, 22.5))]
+    match shape:
+        case Box():
+            return [np.eye(3)]
+        case Cylinder():
+            return about_z
+        case Sphere():
+            return about_z
+
+
+def _box_grasps(size: np.ndarray, R_OF: np.ndarray, gripper: Gripper) -> Iterator[Grasp]:
+    for axis in range(3):
+        width = float(size[axis])
+        if width > gripper.stroke - 2 * CLEARANCE:
+            continue
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        closing = np.eye(3)[axis]
+        for angle in np.arange(0.0, 2 * np.pi - 1e-9, APPROACH_STEP):
+            approach = np.cos(angle) * np.eye(3)[first] + np.sin(angle) * np.eye(3)[second]
+            for side, entry, exit_ in _lines_through(size, approach, axis):
+                depth = min(MAX_DEPTH, exit_ - entry - TIP_CLEARANCE)
+                if depth < min(MIN_DEPTH, 0.6 * (exit_ - entry)):
+                    continue
+                lateral = np.cross(approach, closing)
+                position = lateral * side + approach * (entry + depth)
+                for sign in (1.0, -1.0):
+                    y = sign * closing
+                    R_FG = np.column_stack([np.cross(y, approach), y, approach])
+                    yield Grasp.at(SE3(R_OF @ R_FG, R_OF @ position), width)
+
+
+def _lines_through(size: np.ndarray, approach: np.ndarray, axis: int) -> Iterator[tuple[float, float, float]]:
+    """Parallel lines along `approach` through the box's cross-section square to `axis`.
+
+    Yields (lateral offset, entry, exit) in metres from the centre, offsets on a grid about 0 that
+    leaves half a finger's width of material at either side.
+    """
+    closing = np.eye(3)[axis]
+    lateral = np.cross(approach, closing)
+    reach = float(np.abs(lateral) @ (size / 2)) - 0.01
+    steps = int(max(reach, 0.0) / SIDE_STEP)
+    for k in range(-steps, steps + 1):
+        side = k * SIDE_STEP
+        entry, exit_ = -np.inf, np.inf
+        for other in range(3):
+            if other == axis or abs(approach[other]) < 1e-9:
+                continue
+            near = (-np.sign(approach[other]) * size[other] / 2 - lateral[other] * side) / approach[other]
+            far = (np.sign(approach[other]) * size[other] / 2 - lateral[other] * side) / approach[other]
+            entry, exit_ = max(entry, near), min(exit_, far)
+        if exit_ > entry:
+            yield side, float(entry), float(exit_)

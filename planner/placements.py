@@ -1,0 +1,153 @@
+"""Where and how to let go of a held object inside a container or on the table, best first.
+
+A placement is the object's pose X_WO when released, a little above what it will rest on. It may be
+tilted so that the hand points down into a container; then it falls the rest of the way.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+from pinocchio import SE3
+
+from scenarios.regions import interior
+from scenarios.scenario import Region, Table
+from scenarios.shapes import Shape, extents
+from sim.scene import half_height
+
+DROP = 0.01
+"""Metres between the object's lowest point and what it will rest on, at release."""
+
+TILTS = np.radians([0.0, 40.0, 50.0, 60.0, 75.0, 90.0])
+YAWS = np.radians(np.arange(0.0, 360.0, 30.0))
+WALL_GAP = 0.005
+EDGE_GAP = 0.01
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Pose of the object in W at release, and where it is expected to lie afterwards, as plain numbers.
+
+    release, rest: x, y, z in metres and quaternion (x, y, z, w).
+    """
+
+    release: tuple[float, ...]
+    rest: tuple[float, ...]
+
+    @cached_property
+    def X_WO(self) -> SE3:
+        return pin.XYZQUATToSE3(np.array(self.release))
+
+    @cached_property
+    def X_WO_rest(self) -> SE3:
+        return pin.XYZQUATToSE3(np.array(self.rest))
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A level rectangle to put things on: pose X_WS of its centre, half extents (2,), height of walls around (0: none)."""
+
+    X_WS: SE3
+    half: np.ndarray
+    wall: float
+
+
+def surface_of(place: Region | Table) -> Surface:
+    """The floor of a container or the top of the table."""
+    if isinstance(place, Table):
+        lift = SE3(np.eye(3), np.array([0.0, 0.0, place.size[2] / 2]))
+        return Surface(place.X_WT * lift, np.array(place.size[:2]) / 2, 0.0)
+    lower, upper = interior(place)
+    centre = np.array([(lower[0] + upper[0]) / 2, (lower[1] + upper[1]) / 2, lower[2]])
+    return Surface(place.X_WR * SE3(np.eye(3), centre), (upper[:2] - lower[:2]) / 2, float(upper[2] - lower[2]))
+
+
+def placements(
+    shape: Shape, X_GO: SE3, place: Region | Table, rng: np.random.Generator, spots: int = 6
+) -> Iterator[Placement]:
+    """Placements of an object held at X_GO, the least tilted first, `spots` random positions for each direction.
+
+    The object keeps the face down on which it stood when grasped (nearest to level in the hand);
+    tilting turns it with the hand towards pointing straight down. Overlap with other things is
+    not looked at here.
+    """
+    surface = surface_of(place)
+    if surface.wall == 0.0:
+        tilts = TILTS[:1]
+    else:
+        tilts = TILTS
+    for tilt in tilts:
+        for _ in range(spots):
+            for yaw in rng.permutation(YAWS):
+                for R_upright in _uprights(X_GO):
+                    placement = _placement(shape, X_GO, surface, R_upright, (float(tilt), float(yaw)), rng)
+                    if placement is not None:
+                        yield placement
+
+
+def _placement(
+    shape: Shape,
+    X_GO: SE3,
+    surface: Surface,
+    R_upright: np.ndarray,
+    turn: tuple[float, float],
+    rng: np.random.Generator,
+) -> Placement | None:
+    tilt, yaw = turn
+    R_WO = R_upright
+    approach = R_WO @ X_GO.rotation.T[:, 2]
+    level = approach.copy()
+    level[2] = 0.0
+    if tilt > 0.0:
+        if np.linalg.norm(level) < 0.5:
+            return None
+        axis = np.cross(level / np.linalg.norm(level), np.array([0.0, 0.0, -1.0]))
+        R_WO = pin.exp3(axis / np.linalg.norm(axis) * tilt) @ R_WO
+    R_WO = surface.X_WS.rotation @ pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ R_WO
+    R_SO = surface.X_WS.rotation.T @ R_WO
+    footprint = np.abs(R_SO)[:2] @ extents(shape) / 2
+    room = surface.half - footprint - (WALL_GAP if surface.wall > 0.0 else EDGE_GAP)
+    if np.any(room < 0.0):
+        return None
+    spot = rng.uniform(-room, room)
+    height = half_height(shape, R_SO) + DROP
+    X_WO = surface.X_WS * SE3(R_SO, np.array([spot[0], spot[1], height]))
+    X_rest = surface.X_WS * _fallen(shape, R_SO, spot)
+    return Placement(_numbers(X_WO), _numbers(X_rest))
+
+
+def _uprights(X_GO: SE3) -> list[np.ndarray]:
+    """Rotations R_WO with one face of the object down: the one below a hand that comes from above, else those
+    across which the fingers close (a flat thing grasped from the side stays flat, either way up)."""
+    approach_O = X_GO.rotation.T[:, 2]
+    axis = int(np.argmax(np.abs(approach_O)))
+    if abs(approach_O[axis]) > 0.9:
+        closing_axis = int(np.argmax(np.abs(X_GO.rotation.T[:, 1])))
+        below = [_turn_down(np.sign(approach_O[axis]) * np.eye(3)[axis])]
+        return below + [_turn_down(sign * np.eye(3)[closing_axis]) for sign in (1.0, -1.0)]
+    axis = int(np.argmax(np.abs(X_GO.rotation.T[:, 1])))
+    return [_turn_down(sign * np.eye(3)[axis]) for sign in (1.0, -1.0)]
+
+
+def _turn_down(down_O: np.ndarray) -> np.ndarray:
+    """A rotation that takes the object's direction `down_O` to −z of the world."""
+    z = -down_O
+    x = np.roll(z, 1)
+    return np.vstack([x, np.cross(z, x), z])
+
+
+def _fallen(shape: Shape, R_SO: np.ndarray, spot: np.ndarray) -> SE3:
+    """The resting pose nearest in orientation: the face that is lowest turned fully down."""
+    down_O = -R_SO[2]
+    axis = int(np.argmax(np.abs(down_O)))
+    flat = _turn_down(np.sign(down_O[axis]) * np.eye(3)[axis])
+    delta = R_SO @ flat.T
+    yaw = np.arctan2(delta[1, 0] - delta[0, 1], delta[0, 0] + delta[1, 1])
+    R = pin.rpy.rpyToMatrix(0.0, 0.0, float(yaw)) @ flat
+    return SE3(R, np.array([spot[0], spot[1], half_height(shape, R)]))
+
+
+def _numbers(X: SE3) -> tuple[float, ...]:
+    return tuple(round(float(x), 9) for x in pin.SE3ToXYZQUAT(X))

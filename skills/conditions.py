@@ -1,0 +1,74 @@
+"""Questions that a skill's tree asks of the observed scene while it runs."""
+
+from collections.abc import Callable
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from planner.failure import EffectMissing, GraspSlipped
+from planner.task.facts import place_of
+from sim.scene import Held, SceneState, pose_distance
+from skills.context import ActionRun, SkillContext
+
+SLIP_DISTANCE = 0.015
+SLIP_ANGLE = np.radians(15.0)
+EFFECT_TIME = 1.5
+"""Simulated seconds that an effect may take to show (things fall, roll and come to rest)."""
+
+
+class HandHolds(Behaviour):
+    """Is it still in the hand, where it was when the guard began to look? `name` None: whatever is held then."""
+
+    def __init__(self, name: str | None, run: ActionRun, context: SkillContext) -> None:
+        super().__init__("still held?" if name is None else f"{name} held?")
+        self._expected = name
+        self._run, self._context = run, context
+        self._grip: Held | None = None
+
+    def update(self) -> Status:
+        held = self._context.scene.held
+        name = self._expected or (self._grip.name if self._grip else None)
+        if held is None or (name is not None and held.name != name):
+            return self._slipped(f"{name or 'the tool'} left the hand")
+        if self._grip is None or self._grip.name != held.name:
+            self._grip = held
+        distance, angle = pose_distance(self._grip.X_GO, held.X_GO)
+        if distance > SLIP_DISTANCE or angle > SLIP_ANGLE:
+            return self._slipped(f"{held.name} slipped {distance * 1000:.0f} mm, {np.degrees(angle):.0f}° in the hand")
+        return Status.SUCCESS
+
+    def _slipped(self, reason: str) -> Status:
+        sample = self._run.refinement.sample if self._run.refinement else None
+        self._context.fail(GraspSlipped(self._run.action, reason, sample))
+        self.feedback_message = reason
+        self._grip = None
+        return Status.FAILURE
+
+
+class Achieved(Behaviour):
+    """Did the action bring about what it was for? Things get a moment to come to rest."""
+
+    def __init__(self, effect: Callable[[SceneState], bool], run: ActionRun, context: SkillContext) -> None:
+        super().__init__("achieved?")
+        self._effect = effect
+        self._run, self._context = run, context
+        self._since = 0.0
+
+    def initialise(self) -> None:
+        self._since = self._context.observation.t
+
+    def update(self) -> Status:
+        context, action = self._context, self._run.action
+        if self._effect(context.scene):
+            return Status.SUCCESS
+        if context.observation.t - self._since < EFFECT_TIME:
+            return Status.RUNNING
+        name = action.args[0]
+        held = context.scene.held is not None and context.scene.held.name == name
+        where = "in the hand" if held else place_of(context.scene, name) or "nowhere"
+        sample = self._run.refinement.sample if self._run.refinement else None
+        reason = f"{name} did not come to where it should be: {where}"
+        context.fail(EffectMissing(action, reason, sample))
+        self.feedback_message = reason
+        return Status.FAILURE

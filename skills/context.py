@@ -1,0 +1,93 @@
+"""What the leaves of a skill's tree see and act on while it runs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from planner.failure import Failure, RefinementFailure
+from planner.refinement import Phase, Refinement
+from planner.task.symbols import GroundAction
+from sim.plant import GripCommand, Observation
+from sim.robot import Gripper, RobotModel
+from sim.scene import SceneState
+from skills.control.controller import ArmController
+from skills.control.reference import Mode
+
+GRIP_FORCE = 60.0
+"""Newtons with which the fingers hold an object."""
+
+CLOSING_SPEED = 0.08
+OPENING_GAIN = 12.0
+
+
+class GripDriver:
+    """Turns "open to a width" and "close with a force" into finger commands."""
+
+    def __init__(self, gripper: Gripper) -> None:
+        self._gripper = gripper
+        self._target: float | None = gripper.stroke
+
+    @property
+    def is_closing(self) -> bool:
+        """Are the fingers told to press?"""
+        return self._target is None
+
+    def open_to(self, opening: float) -> None:
+        """Bring the fingers `opening` metres apart and keep them there."""
+        self._target = float(np.clip(opening, 0.0, self._gripper.stroke))
+
+    def close(self) -> None:
+        """Close until an object resists, and go on pressing."""
+        self._target = None
+
+    def command(self, observation: Observation) -> GripCommand:
+        """The finger command for this tick."""
+        if self._target is None:
+            return GripCommand(-CLOSING_SPEED, GRIP_FORCE)
+        error = self._target - observation.opening
+        limit = self._gripper.max_speed / 2
+        return GripCommand(float(np.clip(OPENING_GAIN * error, -limit, limit)), self._gripper.max_force)
+
+
+@dataclass
+class ActionRun:
+    """One action of the plan in force: what was refined for it, replaced when the action starts."""
+
+    action: GroundAction
+    refinement: Refinement | None = None
+
+    def phase(self, name: str) -> Phase:
+        """The refined phase of that name. Raises LookupError before refinement and for unknown names."""
+        phases = self.refinement.phases if self.refinement else ()
+        for phase in phases:
+            if phase.name == name:
+                return phase
+        raise LookupError(f"{self.action} has no phase {name!r}, known: {[phase.name for phase in phases]}")
+
+
+def _ignore(kind: str, **data: Any) -> None:
+    """Drop an event."""
+
+
+@dataclass
+class SkillContext:
+    """Shared by all leaves; the executive brings `observation` and `scene` up to date before each tick of the tree."""
+
+    robot: RobotModel
+    controller: ArmController
+    grip: GripDriver
+    observation: Observation
+    scene: SceneState
+    refine: Callable[[GroundAction], Refinement | RefinementFailure]
+    contact_mode: Mode = "hybrid"
+    report: Callable[..., None] = _ignore
+    failure: Failure | None = None
+    phase: Phase | None = None
+    allowed: frozenset[frozenset[str]] = field(default_factory=frozenset)
+
+    def fail(self, failure: Failure) -> None:
+        """Remember why the running action failed; the first reason counts."""
+        if self.failure is None:
+            self.failure = failure

@@ -1,0 +1,104 @@
+"""Pick: grasp an object where it lies and lift it clear."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+
+from planner.failure import MotionFailure, RefinementFailure
+from planner.grasps import Grasp, grasps, open_width, tool_grasps
+from planner.refinement import Budget, Hints, Phase, Refinement, pairs
+from planner.task.symbols import GroundAction
+from sim.scene import Held, SceneState
+from skills.conditions import Achieved, HandHolds
+from skills.context import ActionRun, SkillContext
+from skills.motions import Close, Follow, Refine, guarded, sequence
+from skills.skill import Toolkit, Unfit, refine_by_sampling
+from skills.waypoints import back_off, legs, raised
+
+STANDOFF = 0.08
+LIFT = 0.10
+NEAR_SPEED = 0.12
+
+
+class Pick:
+    """`pick(object, place)`: an antipodal grasp, found by sampling; then straight in, close, straight up."""
+
+    name = "pick"
+    arity = 2
+
+    def __init__(self, toolkit: Toolkit) -> None:
+        self._kit = toolkit
+
+    def refine(
+        self, action: GroundAction, scene: SceneState, rng: np.random.Generator, budget: Budget, hints: Hints
+    ) -> Refinement | RefinementFailure:
+        def attempt(grasp: Grasp, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
+            return self._attempt(action, grasp, world)
+
+        samples = self._grasps(action.args[0], scene, rng)
+        return refine_by_sampling(action, scene, samples, attempt, budget, hints)
+
+    def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
+        name = refinement.action.args[0]
+        end = refinement.phases[-1]
+        held = Held(name, refinement.sample.X_OG.inverse())
+        X_WG = self._kit.robot.X_WG(end.trajectory.end)
+        moved = scene.moved(name, X_WG * held.X_GO)
+        return replace(moved, q=end.trajectory.end, held=held, opening=refinement.sample.width)
+
+    def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:
+        name = run.action.args[0]
+        return sequence(
+            str(run.action),
+            Refine(run, context),
+            Follow("pre-grasp", run, context),
+            Follow("approach", run, context),
+            Close("close", run, context),
+            guarded("hold", HandHolds(name, run, context), Follow("lift", run, context)),
+            Achieved(lambda scene: scene.held is not None and scene.held.name == name, run, context),
+        )
+
+    def _grasps(self, name: str, scene: SceneState, rng: np.random.Generator) -> Iterator[Grasp]:
+        body = scene.scenario.bodies[name]
+        base = np.array(self._kit.robot.X_WB.translation)
+        sampler = tool_grasps if body.tool else grasps
+        return sampler(body.shape, scene.poses[name], self._kit.robot.gripper, base, rng)
+
+    def _attempt(
+        self, action: GroundAction, grasp: Grasp, scene: SceneState
+    ) -> tuple[Phase, ...] | MotionFailure | Unfit:
+        name, place = action.args[:2]
+        robot, motion = self._kit.robot, self._kit.motion
+        opening = open_width(robot.gripper, grasp.width)
+        ready = replace(scene, opening=opening)
+        X_WG = scene.poses[name] * grasp.X_OG
+        touching = pairs(robot.finger_links, name)
+        hits = motion.hand_hits(ready, X_WG, touching)
+        if hits:
+            movable = hits & frozenset(scene.poses)
+            return Unfit("the hand would hit " + ", ".join(sorted(hits)), movable if movable == hits else frozenset())
+
+        grasped = replace(scene, opening=grasp.width, held=Held(name, grasp.X_OG.inverse()))
+        resting = touching | pairs(name, place)
+        failure: MotionFailure | None = None
+        for path in legs(self._kit, (back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT))):
+            into, out = path
+            failure = motion.line_is_free(ready, into, touching) or motion.line_is_free(grasped, out, resting)
+            if failure:
+                continue
+            reach = motion.move(ready, [into[0]])
+            if isinstance(reach, MotionFailure):
+                failure = reach
+                continue
+            approach = motion.time_line(into, NEAR_SPEED)
+            lift = motion.time_line(out, NEAR_SPEED)
+            still = approach.standstill(approach.end)
+            return (
+                Phase("pre-grasp", "move", reach, opening),
+                Phase("approach", "approach", approach, opening, allowed=touching),
+                Phase("close", "close", still, opening, allowed=resting),
+                Phase("lift", "approach", lift, grasp.width, grasped.held, resting),
+            )
+        return failure or Unfit("the arm can't reach the grasp")

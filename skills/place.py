@@ -1,0 +1,113 @@
+"""Place: bring what the hand holds into a container or onto the table, and let go."""
+
+from dataclasses import replace
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+
+from planner.failure import MotionFailure, RefinementFailure
+from planner.grasps import open_width
+from planner.placements import Placement, placements
+from planner.refinement import Budget, Hints, Phase, Refinement, pairs
+from planner.task.facts import place_of
+from planner.task.symbols import GroundAction
+from scenarios.scenario import Region, Scenario, Table
+from sim.scene import SceneState
+from skills.conditions import Achieved, HandHolds
+from skills.context import ActionRun, SkillContext
+from skills.motions import Follow, Open, Refine, guarded, sequence
+from skills.skill import Toolkit, Unfit, refine_by_sampling
+from skills.waypoints import back_off, legs, raised
+
+STANDOFF = 0.12
+RETREAT = 0.12
+NEAR_SPEED = 0.15
+
+
+def place_named(scenario: Scenario, name: str) -> Region | Table:
+    """The region of that name, or the table. Raises KeyError naming the known places."""
+    if name == "table":
+        return scenario.table
+    if name not in scenario.regions:
+        raise KeyError(f"unknown place {name!r}, known: {', '.join(['table', *sorted(scenario.regions)])}")
+    return scenario.regions[name]
+
+
+class Place:
+    """`place(object, place)`: a release pose found by sampling; straight down to it, open, straight back."""
+
+    name = "place"
+    arity = 2
+
+    def __init__(self, toolkit: Toolkit) -> None:
+        self._kit = toolkit
+
+    def refine(
+        self, action: GroundAction, scene: SceneState, rng: np.random.Generator, budget: Budget, hints: Hints
+    ) -> Refinement | RefinementFailure:
+        name, goal = action.args[:2]
+        if scene.held is None or scene.held.name != name:
+            return RefinementFailure(action, f"the hand does not hold {name}")
+
+        def attempt(placement: Placement, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
+            return self._attempt(action, placement, world)
+
+        shape = scene.scenario.bodies[name].shape
+        samples = placements(shape, scene.held.X_GO, place_named(scene.scenario, goal), rng)
+        return refine_by_sampling(action, scene, samples, attempt, budget, hints)
+
+    def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
+        end = refinement.phases[-1]
+        placed = scene.moved(refinement.action.args[0], refinement.sample.X_WO_rest)
+        return replace(placed, q=end.trajectory.end, held=None, opening=end.opening)
+
+    def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:
+        name, goal = run.action.args[:2]
+        carry = sequence("carry", Follow("pre-place", run, context), Follow("descend", run, context))
+        return sequence(
+            str(run.action),
+            Refine(run, context),
+            guarded("hold", HandHolds(name, run, context), carry),
+            Open("open", run, context),
+            Follow("retreat", run, context),
+            Achieved(lambda scene: scene.held is None and place_of(scene, name) == goal, run, context),
+        )
+
+    def _attempt(
+        self, action: GroundAction, placement: Placement, scene: SceneState
+    ) -> tuple[Phase, ...] | MotionFailure | Unfit:
+        name, goal = action.args[:2]
+        held = scene.held
+        assert held is not None
+        robot, motion = self._kit.robot, self._kit.motion
+        touching = pairs(robot.finger_links, name)
+        lowering = touching | pairs(name, goal)
+        X_WG = placement.X_WO * held.X_GO.inverse()
+        hits = motion.hand_hits(scene, X_WG, touching)
+        if hits:
+            movable = hits & frozenset(scene.poses)
+            return Unfit("the hand would hit " + ", ".join(sorted(hits)), movable if movable == hits else frozenset())
+
+        opening = open_width(robot.gripper, scene.opening)
+        released = replace(scene.moved(name, placement.X_WO), held=None, opening=opening)
+        leaving = lowering | pairs(robot.hand_links, name)
+        failure: MotionFailure | None = None
+        for path in legs(self._kit, (raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT))):
+            into, out = path
+            failure = motion.line_is_free(scene, into, lowering) or motion.line_is_free(released, out, leaving)
+            if failure:
+                continue
+            reach = motion.move(scene, [into[0]], touching)
+            if isinstance(reach, MotionFailure):
+                failure = reach
+                continue
+            descend = motion.time_line(into, NEAR_SPEED)
+            retreat = motion.time_line(out, NEAR_SPEED)
+            still = descend.standstill(descend.end)
+            return (
+                Phase("pre-place", "move", reach, scene.opening, held, touching),
+                Phase("descend", "approach", descend, scene.opening, held, lowering),
+                Phase("open", "open", still, opening, None, leaving),
+                Phase("retreat", "approach", retreat, opening, None, leaving),
+            )
+        return failure or Unfit("the arm can't reach the release pose")

@@ -1,0 +1,141 @@
+"""What a skill is, and what all of them share: trying samples in turn, and naming culprits.
+
+A skill turns an action into motion (`refine`), says what the motion changes (`predict`) and gives the
+behaviour tree that carries it out (`subtree`). One primitive, one file.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from py_trees.behaviour import Behaviour
+
+from planner.failure import Blocked, MotionFailure, RefinementFailure
+from planner.motion.motion_planner import MotionPlanner
+from planner.refinement import Budget, Hints, Phase, Refinement, Refiner
+from planner.task.symbols import GroundAction
+from sim.robot import RobotModel
+from sim.scene import SceneState
+from skills.context import ActionRun, SkillContext
+from skills.control.reference import Mode
+
+UNCOUNTED = 30
+"""Samples that may fail before any motion is sought, for each try that counts."""
+
+
+class Skill(Refiner, Protocol):
+    """A primitive: a refiner with a behaviour tree."""
+
+    name: str
+    arity: int
+
+    def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:
+        """The tree that carries out `run.refinement`, which is filled in before its first motion."""
+        ...
+
+
+@dataclass(frozen=True)
+class ContactSettings:
+    """How contact is made. `mode` "hybrid" (closed loop on the measured force) or "impedance" (open loop).
+
+    stiffness (6,): N/m and Nm/rad in W, linear first, of contact motions in impedance mode.
+    force: N pressed on a sponge; speed: m/s of contact motions. pre_wipe: metres behind the start
+    and above the table of the pose from which a stroke begins, None for what geometry asks.
+    """
+
+    mode: Mode = "hybrid"
+    stiffness: tuple[float, ...] = (1000.0, 1000.0, 500.0, 50.0, 50.0, 50.0)
+    force: float = 10.0
+    speed: float = 0.1
+    pre_wipe: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Toolkit:
+    """What skills refine with."""
+
+    robot: RobotModel
+    motion: MotionPlanner
+    contact: ContactSettings
+
+
+@dataclass(frozen=True)
+class Unfit:
+    """A sample refused by a cheap look, before any motion was sought; culprits as in `Blocked`."""
+
+    reason: str
+    culprits: frozenset[str] = frozenset()
+
+
+Attempt = Callable[[Any, SceneState], "tuple[Phase, ...] | MotionFailure | Unfit"]
+"""Tries one sample in a scene: phases, or why not."""
+
+
+def refine_by_sampling(
+    action: GroundAction, scene: SceneState, samples: Iterable[Any], attempt: Attempt, budget: Budget, hints: Hints
+) -> Refinement | RefinementFailure:
+    """Try samples in turn, hinted ones first, until one works or the budget is spent.
+
+    A sample that fails is tried again without the other movable bodies; if it works then, those
+    of them that its motion would have hit are its culprits.
+    """
+    attempts: list[Blocked] = []
+    counted = uncounted = 0
+    reasons: dict[str, int] = {}
+    for sample in _in_order(samples, hints):
+        outcome = attempt(sample, scene)
+        if isinstance(outcome, tuple):
+            return Refinement(action, sample, outcome)
+        blocked = Blocked(sample, outcome.reason, _culprits(action, sample, scene, attempt, outcome))
+        reasons[blocked.reason] = reasons.get(blocked.reason, 0) + 1
+        if isinstance(outcome, Unfit) and not blocked.culprits:
+            uncounted += 1
+        else:
+            counted += 1
+            attempts.append(blocked)
+        if counted >= budget.tries or uncounted >= UNCOUNTED * budget.tries:
+            break
+    if not reasons:
+        return RefinementFailure(action, "there is nothing to sample from", (Blocked(None, "no sample"),))
+    common = max(reasons, key=lambda reason: reasons[reason])
+    total = counted + uncounted
+    reason = f"none of {total} samples works, most often because {common}"
+    return RefinementFailure(action, reason, tuple(attempts) or (Blocked(None, common),))
+
+
+def _in_order(samples: Iterable[Any], hints: Hints) -> Iterable[Any]:
+    yield from (sample for sample in hints.first if sample not in hints.avoid)
+    yield from (sample for sample in samples if sample not in hints.avoid and sample not in hints.first)
+
+
+def _culprits(
+    action: GroundAction, sample: Any, scene: SceneState, attempt: Attempt, outcome: MotionFailure | Unfit
+) -> frozenset[str]:
+    """Movable bodies without which the sample works and which its motion then would hit; empty if it doesn't."""
+    if not outcome.culprits:
+        return frozenset()
+    suspects = outcome.culprits
+    for _ in range(len(scene.poses)):
+        again = attempt(sample, scene.without(suspects))
+        if isinstance(again, tuple):
+            return _needed(suspects, sample, scene, attempt)
+        if not again.culprits or again.culprits <= suspects:
+            return frozenset()
+        suspects = suspects | again.culprits
+    return frozenset()
+
+
+def _needed(suspects: frozenset[str], sample: Any, scene: SceneState, attempt: Attempt) -> frozenset[str]:
+    """The suspects less those that may stay: dropped one by one while the sample still works."""
+    if len(suspects) == 1:
+        return suspects
+    for name in sorted(suspects):
+        if isinstance(attempt(sample, scene.without(suspects - {name})), tuple):
+            suspects = suspects - {name}
+    return suspects
+
+
+def with_hand(scene: SceneState, q: np.ndarray, phase: Phase) -> SceneState:
+    """The scene as it is while a phase runs: arm at q, hand as the phase has it."""
+    return replace(scene, q=q, opening=phase.opening, held=phase.held)
