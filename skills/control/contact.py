@@ -1,0 +1,99 @@
+"""What touches the hand: from the wrist sensor's wrench to the contact's, and when contact begins and ends."""
+
+import numpy as np
+import pinocchio as pin
+
+from sim.robot import GRAVITY, RobotModel
+from sim.wrench import Wrench
+
+SMOOTHING = 0.02
+"""Time constant in seconds of the smoothed wrench."""
+
+_GRAVITY = np.array([0.0, 0.0, -GRAVITY])
+
+
+class ContactWrench:
+    """Wrench that the world exerts on the tool, at G in W axes (6,): `raw`, and `smooth` (low-passed).
+
+    The sensor also feels the weight and inertia of the hand and its load: both are taken off, the
+    accelerations coming from the model (smooth) instead of differences of measurements (noise).
+    """
+
+    def __init__(self, robot: RobotModel, period: float) -> None:
+        self._robot = robot
+        self._data = robot.data()
+        self._hand = hand_inertia(robot)
+        self._beyond_sensor = self._hand
+        self._blend = 1.0 - np.exp(-period / SMOOTHING)
+        self._bias_G = np.zeros(6)
+        self._smooth_G = np.zeros(6)
+        self.raw = np.zeros(6)
+        self.smooth = np.zeros(6)
+
+    def carry(self, load: pin.Inertia | None) -> None:
+        """The hand holds `load` (in G) from now on, or nothing."""
+        self._beyond_sensor = self._hand if load is None else self._hand + load
+
+    def tare(self) -> None:
+        """Take what is felt now for the sensor's and the model's error. Only in the air, nearly still."""
+        self._bias_G = self._bias_G + self._smooth_G
+        self._smooth_G = np.zeros(6)
+
+    def update(self, q: np.ndarray, v: np.ndarray, a: np.ndarray, wrist: Wrench) -> None:
+        """Read the sensor at configuration q, velocity v and the model's acceleration a (7,)."""
+        robot, data = self._robot, self._data
+        pin.forwardKinematics(robot.model, data, q, v, a)
+        rotation = pin.updateFramePlacement(robot.model, data, robot.tcp_id).rotation
+        twist = pin.getFrameVelocity(robot.model, data, robot.tcp_id, pin.ReferenceFrame.LOCAL)
+        acceleration = pin.getFrameAcceleration(robot.model, data, robot.tcp_id, pin.ReferenceFrame.LOCAL)
+        acceleration.linear = acceleration.linear - rotation.T @ _GRAVITY
+        body = self._beyond_sensor
+        momentum_rate = body * acceleration + twist.cross(body * twist)
+        felt = robot.X_EG.actInv(pin.Force(wrist.vector))
+        contact = (felt + momentum_rate).vector - self._bias_G
+        self._smooth_G = self._smooth_G + self._blend * (contact - self._smooth_G)
+        self.raw = _in_axes(rotation, contact)
+        self.smooth = _in_axes(rotation, self._smooth_G)
+
+
+class Touch:
+    """Whether there is contact, from the normal force at each tick, debounced in both directions."""
+
+    threshold = 1.0
+    """Force in N taken for contact; below half of it contact ends."""
+
+    onset = 0.006
+    """Seconds that the force must be there."""
+
+    release = 0.03
+    """Seconds that it must be gone."""
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._contrary = 0.0
+        self.closed = False
+
+    def update(self, force: float) -> bool:
+        """Take in the normal force in N (pressing is positive). Returns whether the state changed."""
+        contrary = force < self.threshold / 2 if self.closed else force > self.threshold
+        self._contrary = self._contrary + self._period if contrary else 0.0
+        if self._contrary < (self.release if self.closed else self.onset) - 1e-9:
+            return False
+        self.closed = not self.closed
+        self._contrary = 0.0
+        return True
+
+
+def hand_inertia(robot: RobotModel) -> pin.Inertia:
+    """Inertia in G of everything the wrist sensor carries: the bodies that the URDF fixes to the last link."""
+    model = robot.model
+    tool = model.frames[robot.tcp_id]
+    total = pin.Inertia.Zero()
+    for frame in model.frames:
+        if frame.parentJoint == tool.parentJoint and frame.inertia.mass > 0.0:
+            total += tool.placement.actInv(frame.placement).act(frame.inertia)
+    return total
+
+
+def _in_axes(rotation: np.ndarray, wrench: np.ndarray) -> np.ndarray:
+    return (wrench.reshape(2, 3) @ rotation.T).ravel()

@@ -1,0 +1,263 @@
+"""The arm's one controller: position, impedance and force laws on one torque QP, without bumps between them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from planner.motion.trajectory import Trajectory
+from sim.plant import Observation
+from sim.robot import RobotModel
+from sim.wrench import Wrench
+from skills.control.bridge import Bridge
+from skills.control.contact import ContactWrench, Touch
+from skills.control.force import ForceLoop
+from skills.control.reference import Course, Reference
+from skills.control.state import ArmState, Target, measure, target_at
+from skills.control.tasks import HybridTask, JointTask, PoseTask, PostureTask, Task, pose_error
+from skills.control.torque_qp import TorqueQP
+
+LOST_AFTER = 0.014
+"""Seconds without contact, on top of its debouncing, after which a pressed reference has lost it."""
+
+LOST_AFTER_TOUCH = 0.25
+"""The same while touching down, when the tool may bounce."""
+
+PRESSED_SETTLING = 0.1
+"""Seconds that the force is left to settle after it was ramped up."""
+
+AT_REST = 0.02
+"""Joint speed in rad/s below which the arm counts as at rest."""
+
+ARRIVED = 0.01
+"""Joint error in rad below which position mode counts as arrived."""
+
+
+@dataclass(frozen=True)
+class TrackingError:
+    """How far the arm is from its reference now: the tool's position in metres (without the pressed
+    direction) and rotation in rad, and the largest joint error in rad."""
+
+    position: float
+    rotation: float
+    joint: float
+
+
+class ArmController:
+    """Turns observations into joint torques, one call of `update` every `period` seconds.
+
+    What it follows is set by `follow` and `hold`, which take effect at the next `update`. It holds
+    at first. Losing contact while pressed, it holds and says so in `contact_lost`.
+    """
+
+    def __init__(self, robot: RobotModel, period: float = 0.002) -> None:
+        self._unloaded = self._robot = robot
+        self._period = period
+        self._data = robot.data()
+        self._qp = TorqueQP(robot, period)
+        self._wrench = ContactWrench(robot, period)
+        self._touch = Touch(period)
+        self._loop = ForceLoop(period)
+        self._bridge = Bridge(period)
+        self._reference: Reference | None = None
+        self._pending: Reference | None = None
+        self._hold_pending = True
+        self._law_changed = False
+        self._course = Course(Trajectory.standstill(np.zeros(7)))
+        self._state: ArmState | None = None
+        self._tau: np.ndarray | None = None
+        self._a = np.zeros(7)
+        self._pressed = False
+        self._anchor = 0.0
+        self._without_contact = 0.0
+        self.contact_lost = False
+
+    def follow(self, reference: Reference) -> None:
+        """Start following `reference`."""
+        self._pending, self._hold_pending = reference, False
+        self.contact_lost = False
+
+    def hold(self) -> None:
+        """Stop smoothly and stay, in position mode. Calling it again changes nothing."""
+        if self._pending is None and self._reference is None:
+            return
+        self._pending, self._hold_pending = None, True
+
+    def set_payload(self, mass: float, com_G: np.ndarray, inertia_G: np.ndarray) -> None:
+        """A rigid load is in the hand: mass in kg, centre com_G (3,) in m, inertia (3,3) in kg m² about it, in G."""
+        load = pin.Inertia(mass, np.asarray(com_G, dtype=float), np.asarray(inertia_G, dtype=float))
+        self._use(self._unloaded.with_payload(mass, load.lever, load.inertia), load)
+
+    def clear_payload(self) -> None:
+        """The hand is empty again."""
+        self._use(self._unloaded, None)
+
+    def _use(self, robot: RobotModel, load: pin.Inertia | None) -> None:
+        self._robot, self._data = robot, robot.data()
+        self._wrench.carry(load)
+        self._law_changed = True
+
+    def tare(self) -> None:
+        """Take what the wrist sensor feels for its error. In the air, nearly still, before each touch."""
+        self._wrench.tare()
+
+    @property
+    def reference(self) -> Reference | None:
+        """What is followed, or will be at the next update; None while holding."""
+        return self._pending if self._pending is not None or self._hold_pending else self._reference
+
+    @property
+    def time_in_reference(self) -> float:
+        """Seconds along the trajectory; stands still once a reference until contact has touched."""
+        return 0.0 if self._pending is not None else self._course.time
+
+    @property
+    def finished(self) -> bool:
+        """Whether the trajectory's time is over and the arm at rest (in position mode: there), or,
+        until contact, the force has been ramped up and settled."""
+        state = self._state
+        if state is None or self._pending is not None or self._hold_pending:
+            return False
+        if self._reference is not None and self._reference.until_contact and self._pressed:
+            return self._loop.time_since_ramp >= PRESSED_SETTLING
+        if not self._course.over or np.abs(state.v).max() > AT_REST:
+            return False
+        in_position = self._reference is None or self._reference.mode == "position"
+        return not in_position or self.tracking_error.joint < ARRIVED
+
+    @property
+    def contact(self) -> bool:
+        """Whether the tool is pressed on from outside along the contact frame's z axis."""
+        return self._touch.closed
+
+    @property
+    def contact_force(self) -> float:
+        """Smoothed normal force in N along the contact frame's z axis; pressing is positive."""
+        return float(self._normal @ self._wrench.smooth[:3])
+
+    @property
+    def contact_wrench(self) -> Wrench:
+        """Smoothed wrench that the world exerts on the tool, about G, in W axes."""
+        return Wrench(self._wrench.smooth[:3].copy(), self._wrench.smooth[3:].copy())
+
+    @property
+    def tracking_error(self) -> TrackingError:
+        if self._state is None:
+            return TrackingError(0.0, 0.0, 0.0)
+        q, v, a = self._course.now()
+        error = pose_error(target_at(self._robot, self._data, q, v, a), self._state)
+        if self._pressed:
+            error[:3] -= self._normal * (self._normal @ error[:3])
+        joint = float(np.abs(q - self._state.q).max())
+        return TrackingError(float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])), joint)
+
+    @property
+    def fallbacks(self) -> int:
+        """Ticks on which the QP was not solved."""
+        return self._qp.fallbacks
+
+    @property
+    def torque_limit_violations(self) -> int:
+        """Ticks on which the QP's own output broke a torque limit."""
+        return self._qp.torque_limit_violations
+
+    @property
+    def _normal(self) -> np.ndarray:
+        return _UP if self._reference is None else self._reference.normal
+
+    def update(self, observation: Observation) -> np.ndarray:
+        """Torques (7,) in Nm for the next period."""
+        state = measure(self._robot, self._data, observation.q, observation.v)
+        self._state = state
+        self._wrench.update(state.q, state.v, self._a, observation.wrist)
+        if self._pending is not None:
+            self._begin(self._pending, state)
+        elif self._hold_pending:
+            self._begin_hold(state)
+        self._watch_contact(state)
+        tasks, wrench = self._law(state)
+        solution = self._qp.solve(state, tasks, self._bridge.advance() - state.J.T @ wrench)
+        self._a = solution.a
+        self._course.advance(self._period)
+        tau = solution.tau
+        if self._law_changed and self._tau is not None:
+            self._bridge.span(self._tau - tau)
+            tau = self._tau
+        self._law_changed = False
+        self._tau = tau
+        return tau.copy()
+
+    def _begin(self, reference: Reference, state: ArmState) -> None:
+        was_regulated = self._pressed and self._reference is not None and self._reference.mode == "hybrid"
+        self._reference, self._pending = reference, None
+        self._course = Course.joined(reference.trajectory, state.q, state.v, self._robot.a_max)
+        self._law_changed = True
+        self._without_contact = 0.0
+        self._pressed = False
+        if reference.force > 0.0 and not reference.until_contact:
+            self._press(reference, state, keep_loop=was_regulated and reference.mode == "hybrid")
+
+    def _begin_hold(self, state: ArmState) -> None:
+        self._reference, self._hold_pending = None, False
+        self._course = Course.stop(state.q, state.v, self._robot.a_max)
+        self._law_changed = True
+        self._pressed = False
+
+    def _press(self, reference: Reference, state: ArmState, keep_loop: bool) -> None:
+        self._pressed = True
+        self._without_contact = 0.0
+        self._anchor = float(reference.normal @ state.p)
+        if not keep_loop:
+            self._loop.reset(max(float(reference.normal @ self._wrench.raw[:3]), 0.0))
+        self._loop.aim(reference.force)
+
+    def _watch_contact(self, state: ArmState) -> None:
+        self._touch.update(float(self._normal @ self._wrench.raw[:3]))
+        reference = self._reference
+        if reference is None or reference.force == 0.0:
+            return
+        if not self._pressed:
+            if self._touch.closed:
+                self._course.freeze()
+                self._press(reference, state, keep_loop=False)
+            return
+        self._without_contact = 0.0 if self._touch.closed else self._without_contact + self._period
+        if self._without_contact > (LOST_AFTER_TOUCH if reference.until_contact else LOST_AFTER):
+            self.contact_lost = True
+            self._begin_hold(state)
+
+    def _law(self, state: ArmState) -> tuple[list[Task], np.ndarray]:
+        """The tasks of this instant, and the wrench (6,) on the tool, in W, that they rely on."""
+        reference = self._reference
+        joints = self._course.now()
+        if reference is None or reference.mode == "position" or (reference.mode == "hybrid" and not self._pressed):
+            return [JointTask(*joints)], _NO_WRENCH
+        target = target_at(self._robot, self._data, *joints)
+        posture = PostureTask(*joints)
+        normal = reference.normal
+        felt = self._wrench
+        if reference.mode == "hybrid":
+            wrench = felt.smooth.copy()
+            force = self._loop.update(float(normal @ felt.raw[:3]))
+            wrench[:3] += normal * (force - normal @ wrench[:3])
+            return [HybridTask(target, reference.R_WC), posture], wrench
+        assert reference.stiffness is not None
+        if self._pressed:
+            target = self._pressed_target(target, reference)
+        return [PoseTask(target, reference.stiffness), posture], _NO_WRENCH
+
+    def _pressed_target(self, target: Target, reference: Reference) -> Target:
+        """The target in the plane through the touched point, below it by force over stiffness."""
+        assert reference.stiffness is not None
+        normal = reference.normal
+        self._loop.update(self._loop.wanted)
+        depth = self._loop.wanted / float(normal**2 @ reference.stiffness[:3])
+        along = np.outer(normal, normal)
+        V, A = target.V.copy(), target.A.copy()
+        V[:3] -= along @ V[:3]
+        A[:3] -= along @ A[:3]
+        return Target(target.p + normal * (self._anchor - depth - normal @ target.p), target.R, V, A)
+
+
+_UP = np.array([0.0, 0.0, 1.0])
+_NO_WRENCH = np.zeros(6)

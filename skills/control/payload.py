@@ -1,0 +1,62 @@
+"""What is in the hand, from static readings of the wrist sensor: one small QP."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+from qpsolvers import solve_ls
+
+from sim.plant import Observation
+from sim.robot import GRAVITY, RobotModel
+from skills.control.contact import hand_inertia
+
+REACH = 0.15
+"""Largest distance in metres, along each axis of G, of a load's centre of mass from the tool centre."""
+
+
+def estimate_payload(robot: RobotModel, samples: Sequence[Observation]) -> tuple[float, np.ndarray]:
+    """Mass in kg (≥ 0) and centre of mass com_G (3,) in metres of a load held still in the air.
+
+    `robot` is the model without the load. One sample gives the mass and where the line of action
+    runs; two hand orientations or more give the whole centre of mass. Along a direction that the
+    samples say nothing about, the centre is taken at the tool centre.
+
+    Raises ValueError without samples and when no solution is found.
+    """
+    if not samples:
+        raise ValueError("payload estimation needs at least one wrist reading, got none")
+    hand = hand_inertia(robot)
+    data = robot.data()
+    regressor, residual = [], []
+    for sample in samples:
+        pin.forwardKinematics(robot.model, data, sample.q)
+        rotation = pin.updateFramePlacement(robot.model, data, robot.tcp_id).rotation
+        g = rotation.T @ np.array([0.0, 0.0, -GRAVITY])
+        felt = robot.X_EG.actInv(pin.Force(sample.wrist.vector))
+        weight = hand * pin.Motion(g, np.zeros(3))
+        # In the unknowns (m, m c): force m g, torque (m c) × g.
+        block = np.zeros((6, 4))
+        block[:3, 0] = g
+        block[3:, 1:] = -pin.skew(g)
+        regressor.append(block)
+        residual.append((felt - weight).vector)
+    A, b = np.vstack(regressor), np.concatenate(residual)
+    # Torques are small numbers: in units of 0.1 m they weigh as much as the forces.
+    scale = np.tile([1.0, 1.0, 1.0, 10.0, 10.0, 10.0], len(samples))
+    moments_within_reach = np.array([[-REACH, *row] for sign in (1, -1) for row in sign * np.eye(3)])
+    solution = solve_ls(
+        np.vstack([A * scale[:, None], 1e-4 * np.eye(4)]),
+        np.concatenate([b * scale, np.zeros(4)]),
+        G=moments_within_reach,
+        h=np.zeros(6),
+        lb=np.array([0.0, -np.inf, -np.inf, -np.inf]),
+        solver="osqp",
+        eps_abs=1e-9,
+        eps_rel=1e-9,
+        max_iter=20000,
+    )
+    if solution is None:
+        raise ValueError(f"no load explains the {len(samples)} wrist readings")
+    mass = max(float(solution[0]), 0.0)
+    com = solution[1:] / mass if mass > 1e-3 else np.zeros(3)
+    return mass, com

@@ -1,0 +1,125 @@
+"""What the controller is asked to follow, and where along it the arm should be now."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from planner.motion.trajectory import Trajectory
+
+Mode = Literal["position", "impedance", "hybrid"]
+
+SHORTEST_JOINING = 0.1
+"""Seconds in which a difference between the arm and the trajectory's start fades, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A trajectory and the law by which the arm follows it.
+
+    mode "position": stiffly, in joint space. "impedance": the tool as a mass, spring and damper with
+    `stiffness` (6,) (N/m and Nm/rad, linear first, along W's axes). "hybrid": stiffly in all directions
+    of the contact frame C but its z, along which the measured force is regulated.
+
+    force: N to press with along −z of C (0: none). Impedance shifts its set-point below the touched
+    surface by force over stiffness, without measuring what comes of it.
+    R_WC (3,3): axes of C in W; z is the surface's outward normal.
+    until_contact: the trajectory leads through the expected surface and is followed until the tool
+    touches; time then stands still and the force ramps up. Otherwise a reference with a force
+    presses from its start on.
+
+    Raises ValueError for parts that don't fit together.
+    """
+
+    trajectory: Trajectory
+    mode: Mode = "position"
+    stiffness: np.ndarray | None = None
+    force: float = 0.0
+    R_WC: np.ndarray = field(default_factory=lambda: np.eye(3))
+    until_contact: bool = False
+
+    def __post_init__(self) -> None:
+        if self.mode not in ("position", "impedance", "hybrid"):
+            raise ValueError(f"control mode {self.mode!r}, expected position, impedance or hybrid")
+        if not self.force >= 0.0:
+            raise ValueError(f"force to press with is {self.force} N, expected 0 or more")
+        if self.mode == "position" and self.force > 0.0:
+            raise ValueError(f"position mode can't press with {self.force} N, expected impedance or hybrid")
+        if self.mode == "hybrid" and self.force == 0.0:
+            raise ValueError("hybrid mode needs a force above 0 N")
+        if self.until_contact and self.force == 0.0:
+            raise ValueError("a reference until contact needs a force above 0 N")
+        if self.mode == "impedance":
+            stiffness = np.zeros(0) if self.stiffness is None else np.asarray(self.stiffness, dtype=float)
+            if stiffness.shape != (6,) or not (stiffness > 0.0).all():
+                raise ValueError(f"impedance needs six positive stiffnesses, got {self.stiffness}")
+
+    @property
+    def normal(self) -> np.ndarray:
+        """The surface's outward normal (3,) in W."""
+        return self.R_WC[:, 2]
+
+
+class Course:
+    """Progress along a trajectory. Where the arm isn't at its start when it begins, the difference
+    (in position and velocity) fades along a cubic instead of being jumped."""
+
+    def __init__(self, trajectory: Trajectory, joining: Trajectory | None = None) -> None:
+        self._trajectory = trajectory
+        self._joining = joining
+        self._frozen: np.ndarray | None = None
+        self.time = 0.0
+        self._elapsed = 0.0
+
+    @staticmethod
+    def joined(trajectory: Trajectory, q: np.ndarray, v: np.ndarray, a_max: np.ndarray) -> "Course":
+        """Begin from where the arm is (q, v (7,)), joining with at most about half of a_max (7,)."""
+        q0, v0, _ = trajectory.at(0.0)
+        gap, slip = q - q0, v - v0
+        by_gap = np.sqrt(6.0 * np.abs(gap) / (0.5 * a_max)).max()
+        by_slip = (4.0 * np.abs(slip) / (0.5 * a_max)).max()
+        duration = max(SHORTEST_JOINING, float(by_gap), float(by_slip))
+        return Course(trajectory, _fading(gap, slip, duration))
+
+    @staticmethod
+    def stop(q: np.ndarray, v: np.ndarray, a_max: np.ndarray) -> "Course":
+        """Come to rest from q, v (7,) by constant deceleration of at most half of a_max (7,), and stay."""
+        duration = max(SHORTEST_JOINING, float((np.abs(v) / (0.5 * a_max)).max()))
+        rest = q + v * duration / 2
+        return Course(Trajectory.standstill(rest), _fading(q - rest, v, duration))
+
+    @property
+    def trajectory(self) -> Trajectory:
+        return self._trajectory
+
+    @property
+    def over(self) -> bool:
+        """Whether the trajectory's time is over and the start's difference has faded."""
+        joined = self._joining is None or self._elapsed >= self._joining.duration
+        return joined and self.time >= self._trajectory.duration
+
+    def advance(self, period: float) -> None:
+        self._elapsed += period
+        if self._frozen is None:
+            self.time += period
+
+    def freeze(self) -> None:
+        """Stay from now on where the course is now."""
+        self._frozen = self.now()[0]
+
+    def now(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where the joints should be: position, velocity and acceleration (7,)."""
+        if self._frozen is not None:
+            return self._frozen, _STILL, _STILL
+        q, v, a = self._trajectory.at(self.time)
+        if self._joining is None or self._elapsed >= self._joining.duration:
+            return q, v, a
+        dq, dv, da = self._joining.at(self._elapsed)
+        return q + dq, v + dv, a + da
+
+
+def _fading(gap: np.ndarray, slip: np.ndarray, duration: float) -> Trajectory:
+    return Trajectory(np.array([0.0, duration]), np.stack([gap, np.zeros(7)]), np.stack([slip, np.zeros(7)]))
+
+
+_STILL = np.zeros(7)
