@@ -11,7 +11,7 @@ from scenarios import schema
 from scenarios.document import KeyPath
 from scenarios.names import NAME, TABLE, known, name_problem
 from scenarios.regions import interior
-from scenarios.scenario import Scenario
+from scenarios.scenario import Region, Scenario, Table
 from scenarios.solids import Solid, body_solid, region_hull, region_solid, table_solid
 from scenarios.standing import overlap_problem, support_problem
 
@@ -19,6 +19,9 @@ Problem = tuple[KeyPath, str]
 
 GROUPS = ("regions", "fixed", "objects", "tools")
 """The mappings of a scene file whose keys are names."""
+
+LIP_GAP = 0.001
+"""How far in metres a dustpan's lip may lie from the table's top."""
 
 
 def key_of(file: schema.SceneFile, name: str) -> KeyPath:
@@ -86,6 +89,7 @@ def surroundings_problems(scenario: Scenario) -> Iterator[Problem]:
         if problem is not None:
             yield ("regions", region.name, "pose"), f"{region.name!r} {problem}"
         hulls.append(hull)
+        yield from _dustpan_problems(region, scenario.table)
     others = surfaces(scenario)
     for fixture in scenario.fixtures.values():
         solid = body_solid(fixture)
@@ -93,6 +97,22 @@ def surroundings_problems(scenario: Scenario) -> Iterator[Problem]:
         if problem is not None:
             yield ("fixed", fixture.name, "pose"), f"{fixture.name!r} {problem}"
         others.append(solid)
+
+
+def _dustpan_problems(region: Region, table: Table) -> Iterator[Problem]:
+    top = float(table.X_WT.translation[2]) + table.size[2] / 2
+    bottom = float(region.X_WR.translation[2]) - region.size[2] / 2
+    if region.ramp_deg is not None and abs(bottom - top) > LIP_GAP:
+        yield (
+            ("regions", region.name, "pose"),
+            f"the ramp's lip is at z {bottom:.4f}, expected it flush with the table's top at {top:.4f}",
+        )
+    floor = bottom + region.wall
+    if region.kind == "dustpan" and region.ramp_deg is None and floor > top + LIP_GAP:
+        yield (
+            ("regions", region.name, "pose"),
+            f"the floor is at z {floor:.4f}, expected it below the table's top at {top:.4f}, or a ramp_deg",
+        )
 
 
 def body_problems(file: schema.SceneFile, scenario: Scenario) -> Iterator[Problem]:
