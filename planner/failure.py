@@ -1,7 +1,7 @@
 """What the world refused, as values. Errors (wrong input) are exceptions; these are not."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from planner.task.symbols import GroundAction
 
@@ -38,9 +38,14 @@ class Failure:
 
 @dataclass(frozen=True)
 class RefinementFailure(Failure):
-    """No sample within the budget works: one record a sample that was tried."""
+    """No sample within the budget works: one record a sample that was tried.
+
+    `proof` says that no sample can work, whatever the budget: "here" as long as the action's object
+    lies where it lies (out of reach), "anywhere" wherever things lie (too heavy, region too small).
+    """
 
     attempts: tuple[Blocked, ...] = ()
+    proof: Literal["here", "anywhere"] | None = None
 
     @property
     def culprit_sets(self) -> frozenset[frozenset[str]]:

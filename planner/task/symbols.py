@@ -50,10 +50,14 @@ class Step:
 
 @dataclass(frozen=True)
 class TaskPlan:
-    """Steps in the order in which they are to be done, and the goal they lead to."""
+    """Steps in the order in which they are to be done, and the goal they lead to.
+
+    `expansions` counts the search nodes that finding it took.
+    """
 
     steps: tuple[Step, ...]
     goal: frozenset[Fact]
+    expansions: int = 0
 
     @property
     def actions(self) -> tuple[GroundAction, ...]:
@@ -66,3 +70,19 @@ class NoTaskPlan:
 
     exhausted: bool
     expansions: int
+
+
+def resume_at(plan: TaskPlan, facts: frozenset[Fact], first: int = 0) -> int | None:
+    """The largest k ≥ `first` such that the steps from k on are applicable one after the other and reach the goal.
+
+    len(plan.steps) when the goal holds already; None when no such k exists.
+    """
+    return next((k for k in range(len(plan.steps), first - 1, -1) if _leads_to_goal(plan, facts, k)), None)
+
+
+def _leads_to_goal(plan: TaskPlan, facts: frozenset[Fact], k: int) -> bool:
+    for step in plan.steps[k:]:
+        if not step.applicable(facts):
+            return False
+        facts = step.apply(facts)
+    return plan.goal <= facts

@@ -1,0 +1,75 @@
+"""Refines one action, with what is known of it: what worked or was blocked by something now away is tried first."""
+
+from collections.abc import Collection
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from planner.failure import RefinementFailure
+from planner.refinement import Budget, Hints, Refinement, Refiners, Work
+from planner.task.learned import Learned
+from planner.task.situation import Situation, Spot
+from planner.task.symbols import GroundAction
+from sim.scene import SceneState
+
+
+class ActionRefiner:
+    """Refines single actions and remembers, until `forget`, what worked where."""
+
+    def __init__(self, refiners: Refiners, learned: Learned) -> None:
+        self._refiners = refiners
+        self._learned = learned
+        self._refined: dict[tuple[GroundAction, bytes], Refinement] = {}
+        self._worked: dict[tuple[GroundAction, Spot], tuple[Any, ...]] = {}
+
+    def forget(self) -> None:
+        """Start afresh, for another observed scene."""
+        self._refined.clear()
+        self._worked.clear()
+
+    def refine(
+        self,
+        action: GroundAction,
+        situation: Situation,
+        rng: np.random.Generator,
+        budget: Budget,
+        work: Work,
+        first: Collection[Any] = (),
+        avoid: Collection[Any] = (),
+    ) -> tuple[Refinement | RefinementFailure, tuple[Any, ...]]:
+        """The action made concrete, or why not; and the samples that were to be tried first.
+
+        `first` and `avoid` come on top of what was learned. Samples to be tried first count as tries;
+        an action that failed often in the same place gets no others.
+        """
+        key = (action, _fingerprint(situation.scene))
+        known = self._refined.get(key)
+        if known is not None and known.sample not in avoid:
+            return known, ()
+        place = (action, situation.spot(action.args[0]))
+        learned, is_fresh = self._learned.hints(action, situation)
+        avoided = learned.avoid.union(avoid)
+        wanted = dict.fromkeys((*first, *self._worked.get(place, ()), *learned.first))
+        hints = Hints(tuple(sample for sample in wanted if sample not in avoided), avoided)
+        tries = len(hints.first) + (budget.tries if is_fresh else 0)
+        work.add("refinements")
+        outcome = self._refiners[action.name].refine(
+            action, situation.scene, rng, replace(budget, tries=max(1, tries)), hints
+        )
+        if isinstance(outcome, Refinement):
+            self._refined[key] = outcome
+            earlier = (sample for sample in self._worked.get(place, ()) if sample != outcome.sample)
+            self._worked[place] = (outcome.sample, *earlier)
+        return outcome, hints.first
+
+    def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
+        """The scene after the refined action went as meant."""
+        return self._refiners[refinement.action.name].predict(scene, refinement)
+
+
+def _fingerprint(scene: SceneState) -> bytes:
+    """Equal for scenes in which everything is at exactly the same place."""
+    poses = b"".join(name.encode() + X.homogeneous.tobytes() for name, X in sorted(scene.poses.items()))
+    held = scene.held.name.encode() + scene.held.X_GO.homogeneous.tobytes() if scene.held else b""
+    return poses + held + scene.q.tobytes() + np.float64(scene.opening).tobytes()

@@ -1,0 +1,273 @@
+"""Search-then-sample: a task plan, refined action by action; what fails is learned, and the search begins again.
+
+Each round states what is believed and what was learned in PDDL, has the task planner find a plan and
+refines it whole before anything moves. A round that fails adds a fact or makes one stronger. When
+the task planner finds nothing more, budgets are widened and sampled facts retracted, a bounded
+number of times; infeasible is only called what follows from proofs.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from planner.action_refinement import ActionRefiner
+from planner.failure import ExecutionFailure, RefinementFailure
+from planner.plan_refinement import PlanRefiner, RefinedPlan, Report, Stuck
+from planner.refinement import Budget, Refinement, Refiners, Work
+from planner.task.compilation import with_constraints
+from planner.task.facts import facts, objects_of, observed_facts, place_of, stated_in
+from planner.task.given import Given
+from planner.task.learned import Learned
+from planner.task.pddl import Domain, Problem, write_domain, write_problem
+from planner.task.planner import TaskPlanner
+from planner.task.primitives import arities, with_away
+from planner.task.sexpr import PddlError
+from planner.task.situation import Situation
+from planner.task.symbols import Fact, GroundAction, NoTaskPlan, Step, TaskPlan
+from scenarios.names import known
+from sim.scene import SceneState
+
+
+@dataclass(frozen=True)
+class PlanSettings:
+    """Bounds of planning, all counted, none in seconds.
+
+    tries: samples for an action in a round. motion_checks: for a motion query. max_rounds: task
+    plans that are refined. max_expansions: search nodes of one task plan. backtracks: choices
+    revised in refining one task plan. widenings: how often the budgets are doubled. search: how
+    the task planner searches (`planner.task.pyperplan_.SEARCHES`).
+    """
+
+    tries: int = 20
+    motion_checks: int = 4000
+    max_rounds: int = 30
+    max_expansions: int = 10_000
+    backtracks: int = 4
+    widenings: int = 2
+    search: str = "auto"
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A task plan with a refinement for each step, and the scene predicted after each."""
+
+    plan: TaskPlan
+    refinements: tuple[Refinement, ...]
+    scenes: tuple[SceneState, ...]
+    rounds: int
+
+
+@dataclass(frozen=True)
+class NoPlan:
+    """No plan: "proven" that there is none, or none found within the "budget"; why, and what is in the way."""
+
+    verdict: Literal["proven", "budget"]
+    reason: str
+    culprits: frozenset[str]
+    rounds: int
+
+
+class SearchThenSample:
+    """Plans from scenes, and keeps what failures taught from one plan to the next.
+
+    `refiners` are the primitives by name, `domain` the catalogue's domain or a hand-written one
+    with its problem in `given`. Raises PddlError for a domain with actions that no refiner knows.
+    """
+
+    def __init__(
+        self,
+        task_planner: TaskPlanner,
+        refiners: Refiners,
+        domain: Domain,
+        settings: PlanSettings,
+        report: Report,
+        given: Given | None = None,
+    ) -> None:
+        for name in arities(domain):
+            if name not in refiners:
+                raise PddlError(f"action {name!r} is no primitive, {known(name, refiners)}", domain.name)
+        self.learned = Learned(domain)
+        self._task_planner = task_planner
+        self._domain = with_away(domain)
+        self._given = given
+        self._settings = settings
+        self._report = report
+        self._actions = ActionRefiner(refiners, self.learned)
+        self._plans = PlanRefiner(self._actions, self._state, settings.backtracks, report)
+        self._budget = Budget(settings.tries, settings.motion_checks)
+        self._samples: dict[GroundAction, tuple[Any, ...]] = {}
+
+    def facts(self, scene: SceneState) -> frozenset[Fact]:
+        """What holds in a scene as observed, in the predicates of the domain."""
+        if self._given is not None:
+            return self._given.facts(self._domain, scene, self.learned)
+        return stated_in(self._domain, self._objects(scene), facts(scene, self.learned))
+
+    def plan(self, scene: SceneState, goal: frozenset[Fact], rng: np.random.Generator, work: Work) -> Solution | NoPlan:
+        """A plan from the scene as observed, refined whole, or why there is none."""
+        self.learned.observe(scene)
+        self._actions.forget()
+        try:
+            outcome = self._rounds(scene, goal, rng, work)
+        finally:
+            self.learned.forget_predicted()
+        if isinstance(outcome, Solution):
+            self._samples = {}
+            for refinement in reversed(outcome.refinements):
+                earlier = self._samples.get(refinement.action, ())
+                self._samples[refinement.action] = (refinement.sample, *earlier)
+            actions = [str(action) for action in outcome.plan.actions]
+            self._report("solved", {"plan": actions, "rounds": outcome.rounds})
+        return outcome
+
+    def refine(
+        self, action: GroundAction, scene: SceneState, rng: np.random.Generator, work: Work
+    ) -> Refinement | RefinementFailure:
+        """One action of the plan in force refined again in the scene as observed, the plan's samples first.
+
+        A failure is not learned from until it is handed to `learn`.
+        """
+        self.learned.observe(scene)
+        situation, first = Situation.now(scene), self._samples.get(action, ())
+        return self._actions.refine(action, situation, rng, self._budget, work, first=first)[0]
+
+    def learn(self, failure: RefinementFailure | ExecutionFailure, scene: SceneState) -> None:
+        """Take in a failure met while acting; `scene` is as observed."""
+        self.learned.observe(scene)
+        situation = Situation.now(scene)
+        if isinstance(failure, ExecutionFailure):
+            if self.learned.learn_execution(failure, scene):
+                self._report_learned(failure.action, situation)
+            return
+        hinted = (*self._samples.get(failure.action, ()), *self.learned.hints(failure.action, situation)[0].first)
+        self._take_in(failure, situation, hinted)
+
+    def _rounds(
+        self, scene: SceneState, goal: frozenset[Fact], rng: np.random.Generator, work: Work
+    ) -> Solution | NoPlan:
+        settings = self._settings
+        self._budget = Budget(settings.tries, settings.motion_checks)
+        widenings = settings.widenings
+        met: set[tuple[Any, ...]] = set()
+        for number in range(1, settings.max_rounds + 1):
+            problem, found = self._search(scene, goal, self.learned, work, number)
+            stale = False
+            if isinstance(found, TaskPlan):
+                start = Situation.now(scene, problem.init)
+                refined = self._plans.refine(found, start, rng, self._budget, work)
+                if isinstance(refined, RefinedPlan):
+                    plan = TaskPlan(tuple(map(self._without_constraints, refined.steps)), goal, found.expansions)
+                    return Solution(plan, refined.refinements, refined.scenes, number)
+                self._learn_from(refined, found.steps[refined.position + 1 :], rng, work)
+                lesson = (found.actions, refined.position, self.learned.constraints().get(refined.failure.action))
+                stale = lesson in met
+                met.add(lesson)
+            elif (proof := self._proof(scene, goal, found, work, number)) is not None:
+                return proof
+            if isinstance(found, NoTaskPlan) or stale:
+                if widenings == 0:
+                    return self._exhausted(found, number)
+                widenings -= 1
+                self._widen()
+                met.clear()
+        return self._no_plan(f"no plan within {settings.max_rounds} rounds", settings.max_rounds)
+
+    def _search(
+        self, scene: SceneState, goal: frozenset[Fact], learned: Learned, work: Work, number: int
+    ) -> tuple[Problem, TaskPlan | NoTaskPlan]:
+        """State what is believed, given what was learned, and let the task planner search."""
+        objects = self._objects(scene)
+        if self._given is not None:
+            init = self._given.facts(self._domain, scene, learned)
+        else:
+            init = stated_in(self._domain, objects, facts(scene, learned))
+        objects = {name: type_ for name, type_ in objects.items() if name not in self._domain.constants}
+        observed = Problem(f"round-{number}", self._domain.name, objects, init, goal)
+        domain, problem = with_constraints(self._domain, observed, learned.constraints())
+        texts = write_domain(domain), write_problem(problem)
+        found = self._task_planner.solve(*texts, self._settings.max_expansions)
+        work.add("expansions", found.expansions)
+        plan = [str(action) for action in found.actions] if isinstance(found, TaskPlan) else None
+        event = {"round": number, "domain": texts[0], "problem": texts[1], "plan": plan}
+        self._report("round", {**event, "expansions": found.expansions, "proofs_only": learned is not self.learned})
+        return problem, found
+
+    def _learn_from(self, stuck: Stuck, rest: tuple[Step, ...], rng: np.random.Generator, work: Work) -> None:
+        """Learn from the failure that ended a round, and look what else of the kind stands in the way.
+
+        What obstructs one action often obstructs others like it: those of the plan's rest that could
+        come now are tried too, so that one round tells of all of them.
+        """
+        self._take_in(stuck.failure, stuck.situation, stuck.hinted)
+        if not stuck.failure.culprit_sets:
+            return
+        for step in rest:
+            if step.action.name == stuck.failure.action.name and step.applicable(stuck.situation.facts):
+                outcome, hinted = self._actions.refine(step.action, stuck.situation, rng, self._budget, work)
+                if isinstance(outcome, RefinementFailure):
+                    self._take_in(outcome, stuck.situation, hinted)
+
+    def _take_in(self, failure: RefinementFailure, situation: Situation, hinted: tuple[Any, ...]) -> None:
+        self.learned.learn(failure, situation, hinted, self._budget.tries)
+        self._report_learned(failure.action, situation)
+
+    def _report_learned(self, action: GroundAction, situation: Situation) -> None:
+        self._report("learned", {"action": str(action), "sentence": self.learned.sentence(action, situation)})
+
+    def _widen(self) -> None:
+        self._budget = self._budget.widened()
+        self.learned.retract(self._budget.tries)
+        self._report("widened", {"tries": self._budget.tries, "motion_checks": self._budget.motion_checks})
+
+    def _proof(
+        self, scene: SceneState, goal: frozenset[Fact], found: NoTaskPlan, work: Work, number: int
+    ) -> NoPlan | None:
+        """That nothing can work, if the task planner finds nothing even without what was only sampled."""
+        if not found.exhausted:
+            return None
+        proofs = self.learned.proofs()
+        if self.learned:
+            _, unhindered = self._search(scene, goal, proofs, work, number)
+            if isinstance(unhindered, TaskPlan) or not unhindered.exhausted:
+                return None
+        missing = sorted(goal - self.facts(scene))
+        lost = sorted({fact.args[0] for fact in missing if fact.args and self._is_lost(scene, fact.args[0])})
+        reasons = [f"{name} lies neither on the table nor in a region" for name in lost] + proofs.sentences()
+        reason = f"no sequence of actions leads to {', '.join(map(str, missing))}"
+        if reasons:
+            reason += f": {'; '.join(reasons)}"
+        return NoPlan("proven", reason, proofs.culprits().union(lost), number)
+
+    def _is_lost(self, scene: SceneState, name: str) -> bool:
+        is_held = scene.held is not None and scene.held.name == name
+        return name in scene.poses and not is_held and place_of(scene, name) is None
+
+    def _exhausted(self, found: TaskPlan | NoTaskPlan, number: int) -> NoPlan:
+        if isinstance(found, NoTaskPlan) and not found.exhausted:
+            return self._no_plan(f"no task plan within {self._settings.max_expansions} expansions", number)
+        return self._no_plan("no plan found", number)
+
+    def _no_plan(self, what: str, rounds: int) -> NoPlan:
+        reason = f"{what}, with {self._budget.tries} samples for each action"
+        sentences = self.learned.sentences()
+        if sentences:
+            reason += f": {'; '.join(sentences)}"
+        return NoPlan("budget", reason, self.learned.culprits(), rounds)
+
+    def _objects(self, scene: SceneState) -> Mapping[str, str]:
+        if self._given is not None:
+            return {**self._domain.constants, **self._given.problem.objects}
+        return objects_of(scene)
+
+    def _state(self, scene: SceneState) -> frozenset[Fact]:
+        return stated_in(self._domain, self._objects(scene), observed_facts(scene))
+
+    def _without_constraints(self, step: Step) -> Step:
+        """The step in the predicates of the domain alone: the others have no meaning outside the round."""
+
+        def plain(literals: frozenset[Fact]) -> frozenset[Fact]:
+            return frozenset(fact for fact in literals if fact.predicate in self._domain.predicates)
+
+        return Step(step.action, plain(step.preconditions), plain(step.adds), plain(step.deletes))
