@@ -1,0 +1,198 @@
+"""The fast collision model: the scene as arrays, checked by compiled code (about a microsecond a configuration)."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from pinocchio import SE3
+
+from planner.motion.kernels import (
+    BOX,
+    CYLINDER,
+    HALF,
+    LOWER,
+    OBSTACLE_COLUMNS,
+    PART,
+    SOLID_COLUMNS,
+    SPHERE,
+    UPPER,
+    ArmArrays,
+    SceneArrays,
+    edge_is_free,
+    hand_contacts,
+)
+from planner.motion.world import Margins, Standing
+from scenarios.shapes import Box, Cylinder, Shape, Sphere, bounding_radius, extents
+from sim.robot import RobotModel
+from sim.scene import Held, SceneState
+
+JOINT_STEP = 0.05
+"""Largest step of a joint, in rad, between two configurations checked on an edge."""
+
+TRAVEL_STEP = 0.02
+"""Largest way of the hand, in metres, between two configurations checked on an edge."""
+
+
+ARM_LINKS = 8
+"""Links 0 to 7; hand, fingers and held body ride on the last."""
+
+_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+
+
+class FastChecker:
+    """Spheres, boxes and cylinders in numba, for planners: never calls free what the exact model calls a collision.
+
+    Where it may refuse what is free (by millimetres, near corners and rims) is told in `kernels`.
+    Link 0 never moves, so it is checked against the arm and the held body only, not against the scene.
+    """
+
+    def __init__(self, robot: RobotModel, scene: SceneState, margins: Margins | None = None) -> None:
+        margins = Margins() if margins is None else margins
+        parts = part_names(robot, scene.held)
+        self.checks = 0
+        arm = _arm_arrays(robot, scene.opening, _held(scene))
+        self._tables = (*arm, *_scene_arrays(arm, parts, scene, margins))
+
+    def is_free(self, q: np.ndarray) -> bool:
+        """Is q (7,) within the joint limits and free of collision?"""
+        return self.edge_is_free(q, q)
+
+    def edge_is_free(self, qa: np.ndarray, qb: np.ndarray) -> bool:
+        """Is the straight edge from qa (known to be free) to qb free, at JOINT_STEP and TRAVEL_STEP?"""
+        # Copies: a read-only array is another type to numba, and would be compiled for anew.
+        start = np.array(qa, dtype=float)
+        end = start if qb is qa else np.array(qb, dtype=float)
+        free, checks = edge_is_free(start, end, JOINT_STEP, TRAVEL_STEP, *self._tables)
+        self.checks += checks
+        return free
+
+
+def hand_hits(robot: RobotModel, scene: SceneState, X_WG: SE3, margins: Margins) -> frozenset[str]:
+    """Names of what hand, fingers or held body would come too near to with the gripper at X_WG, wherever the arm is."""
+    arm = _arm_arrays(robot, scene.opening, _held(scene))
+    names, table = _obstacle_rows(Standing(scene))
+    X_W7 = X_WG * robot.model.frames[robot.tcp_id].placement.inverse()
+    hits = hand_contacts(_placement(X_W7), arm.solids, table, margins.table(part_names(robot, scene.held), names))
+    return frozenset(name for name, hit in zip(names, hits, strict=True) if hit)
+
+
+def _held(scene: SceneState) -> tuple[Held, Shape] | None:
+    return None if scene.held is None else (scene.held, scene.scenario.bodies[scene.held.name].shape)
+
+
+def part_names(robot: RobotModel, held: Held | None) -> tuple[str, ...]:
+    """Names of the parts that can collide: the robot's links, and the held body last."""
+    return robot.links if held is None else (*robot.links, held.name)
+
+
+def self_collision_pairs(parts: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Pairs of the robot's parts that can meet: the outer arm, hand and held body against the links further in.
+
+    Neighbours and next neighbours overlap by construction; the joint limits keep the pairs left out apart.
+    """
+    links, riders = parts[:ARM_LINKS], parts[ARM_LINKS:]
+    found = [(outer, inner) for k, outer in enumerate(links) for inner in links[: max(0, k - 3)]]
+    return found + [(rider, inner) for rider in riders for inner in links[:6]]
+
+
+def _kind(shape: Shape) -> int:
+    match shape:
+        case Box():
+            return BOX
+        case Cylinder():
+            return CYLINDER
+        case Sphere():
+            return SPHERE
+
+
+class _Chain(NamedTuple):
+    joints: np.ndarray
+    base: np.ndarray
+    spheres: np.ndarray
+    first: np.ndarray
+    covers: np.ndarray
+
+
+@lru_cache(maxsize=8)
+def _chain(robot: RobotModel) -> _Chain:
+    """The arm without the hand, which never changes."""
+    if any(joint.shortname() != "JointModelRZ" for joint in robot.model.joints[1:]) or robot.model.nq != 7:
+        raise ValueError(f"robot {robot.name!r}: seven revolute joints about z expected")
+    spheres: list[np.ndarray] = []
+    first, covers = [0], np.zeros((ARM_LINKS, 4))
+    for k, link in enumerate(robot.links[:ARM_LINKS]):
+        own = []
+        for solid in robot.geometry:
+            if solid.link == link:
+                if not isinstance(solid.shape, Sphere):
+                    raise ValueError(f"robot {robot.name!r}: {link} has the solid {solid.shape}, spheres expected")
+                own.append([*solid.X_LS.translation, solid.shape.radius])
+        table = np.array(own)
+        covers[k, :3] = table[:, :3].mean(axis=0)
+        covers[k, 3] = np.max(np.linalg.norm(table[:, :3] - covers[k, :3], axis=1) + table[:, 3])
+        spheres.append(table)
+        first.append(first[-1] + len(table))
+    joints = np.array([_placement(X) for X in robot.model.jointPlacements[1:]])
+    return _Chain(joints, _placement(robot.X_WB), np.concatenate(spheres), np.array(first), covers)
+
+
+def _placement(X: SE3) -> np.ndarray:
+    return np.concatenate([X.rotation.ravel(), X.translation])
+
+
+def _solid_row(shape: Shape, X: SE3, part: int) -> np.ndarray:
+    return np.concatenate([[_kind(shape), part, bounding_radius(shape)], extents(shape) / 2, _placement(X)])
+
+
+def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | None) -> ArmArrays:
+    chain = _chain(robot)
+    neutral = np.zeros(7)
+    poses = robot.link_poses(neutral, opening)
+    X_7W = poses["link_7"].inverse()
+    X_7G = X_7W * robot.X_WG(neutral)
+    solids = [
+        _solid_row(solid.shape, X_7W * poses[solid.link] * solid.X_LS, robot.links.index(solid.link))
+        for solid in robot.geometry
+        if solid.link in robot.hand_links
+    ]
+    probes = [X_7G.translation]
+    if held is not None:
+        grip, shape = held
+        X_7O = X_7G * grip.X_GO
+        solids.append(_solid_row(shape, X_7O, len(robot.links)))
+        probes += [X_7O.act(corner) for corner in _CORNERS * extents(shape) / 2]
+    limits = np.stack([robot.q_min, robot.q_max])
+    return ArmArrays(*chain[:2], limits, *chain[2:], np.array(solids), np.array(probes))
+
+
+@lru_cache(maxsize=64)
+def _obstacle_rows(standing: Standing) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names, and the table (n, OBSTACLE_COLUMNS) of `kernels`."""
+    world = standing.obstacles
+    table = np.zeros((len(world), OBSTACLE_COLUMNS))
+    for row, obstacle in zip(table, world, strict=True):
+        row[:SOLID_COLUMNS] = _solid_row(obstacle.shape, obstacle.X_WS, 0)
+        reach = np.abs(obstacle.X_WS.rotation) @ row[HALF : HALF + 3]
+        row[LOWER : LOWER + 3] = obstacle.X_WS.translation - reach
+        row[UPPER : UPPER + 3] = obstacle.X_WS.translation + reach
+    return tuple(obstacle.name for obstacle in world), table
+
+
+def _scene_arrays(arm: ArmArrays, parts: tuple[str, ...], scene: SceneState, margins: Margins) -> SceneArrays:
+    names, table = _obstacle_rows(Standing(scene))
+    links, solids = [], []
+    for outer, inner in self_collision_pairs(parts):
+        margin = margins.within_robot(outer, inner)
+        a, b = parts.index(outer), parts.index(inner)
+        if margin == -np.inf:
+            continue
+        if a < ARM_LINKS:
+            links.append((a, b, margin))
+        else:
+            solids += [(s, b, margin) for s, part in enumerate(arm.solids[:, PART]) if part == a]
+    return SceneArrays(
+        obstacles=table,
+        margins=margins.table(parts, names),
+        link_pairs=np.array(links, dtype=float).reshape(-1, 3),
+        solid_pairs=np.array(solids, dtype=float).reshape(-1, 3),
+    )

@@ -1,0 +1,394 @@
+"""Collision tests compiled with numba: one call checks a configuration or a whole edge.
+
+Solids are boxes, cylinders and spheres with half extents about their centre. A sphere against
+anything is exact. Two solids that aren't spheres are held apart by a separating axis: among the
+axes tried, one along which both are further apart than the margin. For two boxes these are the
+classic fifteen (Gottschalk, Lin, Manocha: OBBTree, 1996), exact at margin zero; with a margin, or with a
+cylinder, a pair may be rejected that is apart by slightly more (two corners, or a rim facing a
+corner): never the other way round.
+
+Everything travels in few, flat tables, because a compiled call pays for every array it is handed.
+Placements are 12 numbers: the rotation row by row, then the origin.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+BOX = 0
+CYLINDER = 1
+SPHERE = 2
+
+# Columns of a table of solids.
+KIND, PART, BOUND, HALF, PLACE = 0, 1, 2, 3, 6
+SOLID_COLUMNS = 18
+# Columns of a table of obstacles: as above, then the world bounds.
+LOWER, UPPER = 18, 21
+OBSTACLE_COLUMNS = 24
+
+
+class ArmArrays(NamedTuple):
+    """The robot as tables.
+
+    joints (7,12): placement of each joint (revolute about z) in the previous link, the first in W.
+    base (12,): placement of link 0 in W. limits (2,7): lowest and highest position.
+    spheres (n,4): centre in the link's frame and radius; link i has rows first[i]:first[i+1].
+    covers (8,4): a sphere around each link's spheres. solids (m,18): hand, fingers and held body in
+    link 7. probes (k,3): points in link 7 whose travel along an edge is bounded.
+    """
+
+    joints: np.ndarray
+    base: np.ndarray
+    limits: np.ndarray
+    spheres: np.ndarray
+    first: np.ndarray
+    covers: np.ndarray
+    solids: np.ndarray
+    probes: np.ndarray
+
+
+class SceneArrays(NamedTuple):
+    """What the robot may hit.
+
+    obstacles (n,24) in W. margins (parts,n): least distance of robot part and obstacle, −inf: not
+    checked. link_pairs (k,3), solid_pairs (l,3): (link, link, margin) and (solid, link, margin) of the robot itself.
+    """
+
+    obstacles: np.ndarray
+    margins: np.ndarray
+    link_pairs: np.ndarray
+    solid_pairs: np.ndarray
+
+
+@njit(cache=True)
+def _compose(a, i, b, j, out, k):
+    """out[k] = a[i] ∘ b[j], rows of placements."""
+    for r in range(3):
+        x, y, z = a[i, 3 * r], a[i, 3 * r + 1], a[i, 3 * r + 2]
+        for c in range(3):
+            out[k, 3 * r + c] = x * b[j, c] + y * b[j, 3 + c] + z * b[j, 6 + c]
+        out[k, 9 + r] = a[i, 9 + r] + x * b[j, 9] + y * b[j, 10] + z * b[j, 11]
+
+
+@njit(cache=True)
+def place_links(q, base, joints, links):
+    """Write the placements of links 0 to 7 in W, links (8,12), at q (7,)."""
+    for i in range(12):
+        links[0, i] = base[i]
+        links[1, i] = joints[0, i]
+    for k in range(7):
+        if k > 0:
+            _compose(links, k, joints, k, links, k + 1)
+        c, s = np.cos(q[k]), np.sin(q[k])
+        for r in range(3):
+            x, y = links[k + 1, 3 * r], links[k + 1, 3 * r + 1]
+            links[k + 1, 3 * r] = c * x + s * y
+            links[k + 1, 3 * r + 1] = c * y - s * x
+
+
+@njit(cache=True)
+def _place_points(links, row, points, start, stop, out):
+    """out[i, :3] = points[i, :3], given in the frame of links[row], in W."""
+    for i in range(start, stop):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        for r in range(3):
+            out[i, r] = (
+                links[row, 9 + r] + links[row, 3 * r] * x + links[row, 3 * r + 1] * y + links[row, 3 * r + 2] * z
+            )
+
+
+@njit(cache=True)
+def _distance_in_frame(x, y, z, solids, k):
+    """Distance of a point, in the frame of solid k, from that solid (0 inside)."""
+    kind = solids[k, KIND]
+    if kind == SPHERE:
+        return max(0.0, np.sqrt(x * x + y * y + z * z) - solids[k, HALF])
+    dz = max(0.0, abs(z) - solids[k, HALF + 2])
+    if kind == CYLINDER:
+        dr = max(0.0, np.sqrt(x * x + y * y) - solids[k, HALF])
+        return np.sqrt(dr * dr + dz * dz)
+    dx = max(0.0, abs(x) - solids[k, HALF])
+    dy = max(0.0, abs(y) - solids[k, HALF + 1])
+    return np.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@njit(cache=True)
+def _distance(dx, dy, dz, solids, k):
+    """Distance from solid k of a point that is d away from its centre."""
+    R = PLACE
+    x = solids[k, R] * dx + solids[k, R + 3] * dy + solids[k, R + 6] * dz
+    y = solids[k, R + 1] * dx + solids[k, R + 4] * dy + solids[k, R + 7] * dz
+    z = solids[k, R + 2] * dx + solids[k, R + 5] * dy + solids[k, R + 8] * dz
+    return _distance_in_frame(x, y, z, solids, k)
+
+
+@njit(cache=True)
+def _out_of_bounds(x, y, z, reach, obstacles, k):
+    """Is the cube of half side `reach` about the point clear of the obstacle's world bounds?"""
+    return (
+        x + reach < obstacles[k, LOWER]
+        or x - reach > obstacles[k, UPPER]
+        or y + reach < obstacles[k, LOWER + 1]
+        or y - reach > obstacles[k, UPPER + 1]
+        or z + reach < obstacles[k, LOWER + 2]
+        or z - reach > obstacles[k, UPPER + 2]
+    )
+
+
+@njit(cache=True)
+def _boxes_apart(solids, s, reach, margin, obstacles, k):
+    """Are the world bounds of solid s (`reach`: their half extents) and of obstacle k apart?"""
+    for i in range(3):
+        centre, half = solids[s, PLACE + 9 + i], reach[i] + margin
+        if centre + half < obstacles[k, LOWER + i] or centre - half > obstacles[k, UPPER + i]:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _sphere_hits(x, y, z, reach, obstacles, k):
+    """Does a sphere of radius `reach` (margin included) touch obstacle k?"""
+    if _out_of_bounds(x, y, z, reach, obstacles, k):
+        return False
+    p = PLACE + 9
+    dx, dy, dz = x - obstacles[k, p], y - obstacles[k, p + 1], z - obstacles[k, p + 2]
+    return _distance(dx, dy, dz, obstacles, k) < reach
+
+
+@njit(cache=True)
+def _half_width(nx, ny, nz, solids, k):
+    """Half the extent of box or cylinder k along the unit axis n."""
+    R = PLACE
+    z = abs(nx * solids[k, R + 2] + ny * solids[k, R + 5] + nz * solids[k, R + 8])
+    if solids[k, KIND] == CYLINDER:
+        return solids[k, HALF] * np.sqrt(max(0.0, 1.0 - z * z)) + solids[k, HALF + 2] * z
+    x = abs(nx * solids[k, R] + ny * solids[k, R + 3] + nz * solids[k, R + 6])
+    y = abs(nx * solids[k, R + 1] + ny * solids[k, R + 4] + nz * solids[k, R + 7])
+    return solids[k, HALF] * x + solids[k, HALF + 1] * y + solids[k, HALF + 2] * z
+
+
+@njit(cache=True)
+def _unit_separates(nx, ny, nz, dx, dy, dz, first, i, second, j, margin):
+    """Does the unit axis n keep two solids, d apart from centre to centre, further apart than the margin?"""
+    gap = abs(nx * dx + ny * dy + nz * dz) - margin
+    return gap > _half_width(nx, ny, nz, first, i) + _half_width(nx, ny, nz, second, j)
+
+
+@njit(cache=True)
+def _separates(nx, ny, nz, dx, dy, dz, first, i, second, j, margin):
+    """The same for an axis of any length; one of no length separates nothing."""
+    length = np.sqrt(nx * nx + ny * ny + nz * nz)
+    if length < 1e-6:
+        return False
+    return _unit_separates(nx / length, ny / length, nz / length, dx, dy, dz, first, i, second, j, margin)
+
+
+@njit(cache=True)
+def _radial_axis_separates(dx, dy, dz, solids, s, first, i, second, j, margin):
+    """The axis from centre to centre, square to the axis of cylinder s of `solids`."""
+    ax, ay, az = solids[s, PLACE + 2], solids[s, PLACE + 5], solids[s, PLACE + 8]
+    along = dx * ax + dy * ay + dz * az
+    return _separates(dx - along * ax, dy - along * ay, dz - along * az, dx, dy, dz, first, i, second, j, margin)
+
+
+@njit(cache=True)
+def solids_apart(first, i, second, j, margin):
+    """Are two boxes or cylinders surely further apart than `margin`? Conservative, as the module says."""
+    p, R = PLACE + 9, PLACE
+    dx, dy, dz = second[j, p] - first[i, p], second[j, p + 1] - first[i, p + 1], second[j, p + 2] - first[i, p + 2]
+    for c in range(3):
+        nx, ny, nz = first[i, R + c], first[i, R + 3 + c], first[i, R + 6 + c]
+        if _unit_separates(nx, ny, nz, dx, dy, dz, first, i, second, j, margin):
+            return True
+        nx, ny, nz = second[j, R + c], second[j, R + 3 + c], second[j, R + 6 + c]
+        if _unit_separates(nx, ny, nz, dx, dy, dz, first, i, second, j, margin):
+            return True
+    for c in range(3):
+        ax, ay, az = first[i, R + c], first[i, R + 3 + c], first[i, R + 6 + c]
+        for e in range(3):
+            bx, by, bz = second[j, R + e], second[j, R + 3 + e], second[j, R + 6 + e]
+            nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            if _separates(nx, ny, nz, dx, dy, dz, first, i, second, j, margin):
+                return True
+    if first[i, KIND] == CYLINDER and _radial_axis_separates(dx, dy, dz, first, i, first, i, second, j, margin):
+        return True
+    if second[j, KIND] == CYLINDER and _radial_axis_separates(dx, dy, dz, second, j, first, i, second, j, margin):
+        return True
+    return _separates(dx, dy, dz, dx, dy, dz, first, i, second, j, margin)
+
+
+@njit(cache=True)
+def _solid_hits(solids, s, obstacles, k, margin):
+    """Does solid s of the hand, placed in W, come nearer to obstacle k than the margin?"""
+    p = PLACE + 9
+    x, y, z = solids[s, p], solids[s, p + 1], solids[s, p + 2]
+    if solids[s, KIND] == SPHERE:
+        return _sphere_hits(x, y, z, solids[s, HALF] + margin, obstacles, k)
+    if obstacles[k, KIND] == SPHERE:
+        dx, dy, dz = obstacles[k, p] - x, obstacles[k, p + 1] - y, obstacles[k, p + 2] - z
+        return _distance(dx, dy, dz, solids, s) < obstacles[k, HALF] + margin
+    return not solids_apart(solids, s, obstacles, k, margin)
+
+
+@njit(cache=True)
+def _hand_hits(solids, obstacles, margins, hits, first_only):
+    """Mark in hits (n,) the obstacles that the placed solids come too near to. With first_only, stop at one: True."""
+    reach = np.empty(3)
+    for s in range(solids.shape[0]):
+        part = int(solids[s, PART])
+        reach[0] = _half_width(1.0, 0.0, 0.0, solids, s)
+        reach[1] = _half_width(0.0, 1.0, 0.0, solids, s)
+        reach[2] = _half_width(0.0, 0.0, 1.0, solids, s)
+        for k in range(obstacles.shape[0]):
+            margin = margins[part, k]
+            if margin == -np.inf or _boxes_apart(solids, s, reach, margin, obstacles, k):
+                continue
+            if _solid_hits(solids, s, obstacles, k, margin):
+                hits[k] = True
+                if first_only:
+                    return True
+    return False
+
+
+@njit(cache=True)
+def hand_contacts(link, solids, obstacles, margins):
+    """Which obstacles do the solids, riding on a link placed at `link` (12,), come too near to? (n,) of bool."""
+    placed, hits = solids.copy(), np.zeros(obstacles.shape[0], dtype=np.bool_)
+    for s in range(solids.shape[0]):
+        _compose(link.reshape(1, 12), 0, solids[:, PLACE : PLACE + 12], s, placed[:, PLACE : PLACE + 12], s)
+    _hand_hits(placed, obstacles, margins, hits, False)
+    return hits
+
+
+@njit(cache=True)
+def _links_hit(covers, spheres, radii, first, obstacles, margins):
+    """Do the spheres (n,3) of links 1 to 7, or only the covers around them, hit something?"""
+    for link in range(1, 8):
+        x, y, z, cover = covers[link, 0], covers[link, 1], covers[link, 2], covers[link, 3]
+        for k in range(obstacles.shape[0]):
+            margin = margins[link, k]
+            if margin == -np.inf or _out_of_bounds(x, y, z, cover + margin, obstacles, k):
+                continue
+            for s in range(first[link], first[link + 1]):
+                if _sphere_hits(spheres[s, 0], spheres[s, 1], spheres[s, 2], radii[s, 3] + margin, obstacles, k):
+                    return True
+    return False
+
+
+@njit(cache=True)
+def _covers_meet(covers, a, b, margin):
+    dx, dy, dz = covers[a, 0] - covers[b, 0], covers[a, 1] - covers[b, 1], covers[a, 2] - covers[b, 2]
+    reach = covers[a, 3] + covers[b, 3] + margin
+    return dx * dx + dy * dy + dz * dz < reach * reach
+
+
+@njit(cache=True)
+def _links_meet(covers, spheres, radii, first, pairs):
+    for n in range(pairs.shape[0]):
+        a, b = int(pairs[n, 0]), int(pairs[n, 1])
+        if not _covers_meet(covers, a, b, pairs[n, 2]):
+            continue
+        for s in range(first[a], first[a + 1]):
+            for t in range(first[b], first[b + 1]):
+                dx, dy = spheres[s, 0] - spheres[t, 0], spheres[s, 1] - spheres[t, 1]
+                dz = spheres[s, 2] - spheres[t, 2]
+                reach = radii[s, 3] + radii[t, 3] + pairs[n, 2]
+                if dx * dx + dy * dy + dz * dz < reach * reach:
+                    return True
+    return False
+
+
+@njit(cache=True)
+def _hand_meets_arm(solids, spheres, radii, first, pairs):
+    p = PLACE + 9
+    for n in range(pairs.shape[0]):
+        s, link = int(pairs[n, 0]), int(pairs[n, 1])
+        for t in range(first[link], first[link + 1]):
+            reach = radii[t, 3] + pairs[n, 2]
+            dx, dy = spheres[t, 0] - solids[s, p], spheres[t, 1] - solids[s, p + 1]
+            dz = spheres[t, 2] - solids[s, p + 2]
+            if dx * dx + dy * dy + dz * dz > (reach + solids[s, BOUND]) ** 2:
+                continue
+            if _distance(dx, dy, dz, solids, s) < reach:
+                return True
+    return False
+
+
+@njit(cache=True)
+def _is_free(q, arm, scene, links, centres, covers, solids, hits):
+    """The check itself; the last five are workspaces (solids: a copy of arm.solids, placed in W here)."""
+    place_links(q, arm.base, arm.joints, links)
+    for s in range(solids.shape[0]):
+        _compose(links, 7, arm.solids[:, PLACE : PLACE + 12], s, solids[:, PLACE : PLACE + 12], s)
+    if _hand_hits(solids, scene.obstacles, scene.margins, hits, True):
+        return False
+    for link in range(8):
+        _place_points(links, link, arm.spheres, arm.first[link], arm.first[link + 1], centres)
+        _place_points(links, link, arm.covers, link, link + 1, covers)
+    if _links_hit(covers, centres, arm.spheres, arm.first, scene.obstacles, scene.margins):
+        return False
+    if _links_meet(covers, centres, arm.spheres, arm.first, scene.link_pairs):
+        return False
+    return not _hand_meets_arm(solids, centres, arm.spheres, arm.first, scene.solid_pairs)
+
+
+@njit(cache=True)
+def _between(qa, qb, fraction, q):
+    for k in range(7):
+        q[k] = qa[k] + (qb[k] - qa[k]) * fraction
+
+
+@njit(cache=True)
+def _edge_steps(qa, qb, arm, links, q, joint_step, travel_step):
+    """Number of equal steps from qa to qb of at most `joint_step` rad a joint and about `travel_step` metres of
+    the hand (its chords over both halves of the edge, a tenth added)."""
+    widest = 0.0
+    for k in range(7):
+        widest = max(widest, abs(qb[k] - qa[k]))
+    n = arm.probes.shape[0]
+    places = np.empty((3, n, 3))
+    for half in range(3):
+        _between(qa, qb, half / 2, q)
+        place_links(q, arm.base, arm.joints, links)
+        _place_points(links, 7, arm.probes, 0, n, places[half])
+    travel = 0.0
+    for half in range(2):
+        for m in range(n):
+            square = 0.0
+            for i in range(3):
+                square += (places[half + 1, m, i] - places[half, m, i]) ** 2
+            travel = max(travel, 2.2 * np.sqrt(square))
+    return max(1, int(np.ceil(widest / joint_step)), int(np.ceil(travel / travel_step)))
+
+
+@njit(cache=True)
+def edge_is_free(qa, qb, joint_step, travel_step, *tables):
+    """Is the straight edge from qa to qb (both (7,)) free, given that qa is? For qb = qa: is qb free?
+
+    `tables` are those of ArmArrays, then those of SceneArrays (a call with plain arrays costs a
+    third of one with tuples of arrays). Returns the answer and the number of configurations
+    checked. The end comes first, then the middle, then the quarters: a blocked edge is found
+    blocked soon.
+    """
+    arm, scene = ArmArrays(*tables[:8]), SceneArrays(*tables[8:])
+    for k in range(7):
+        if not (arm.limits[0, k] <= qb[k] <= arm.limits[1, k]):
+            return False, 1
+    links, centres, q = np.empty((8, 12)), np.empty((arm.spheres.shape[0], 3)), np.empty(7)
+    covers, solids, hits = arm.covers.copy(), arm.solids.copy(), np.zeros(scene.obstacles.shape[0], dtype=np.bool_)
+    count = _edge_steps(qa, qb, arm, links, q, joint_step, travel_step)
+    if not _is_free(qb, arm, scene, links, centres, covers, solids, hits):
+        return False, 1
+    checks = 1
+    stride = 1
+    while 2 * stride < count:
+        stride *= 2
+    while stride >= 1:
+        for i in range(stride, count, 2 * stride):
+            checks += 1
+            _between(qa, qb, i / count, q)
+            if not _is_free(q, arm, scene, links, centres, covers, solids, hits):
+                return False, checks
+        stride //= 2
+    return True, checks

@@ -1,0 +1,258 @@
+"""What skills ask about motion: inverse kinematics, straight lines, collision-free moves, and their timing."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pinocchio import SE3
+
+from planner.failure import MotionFailure
+from planner.motion.blame import blame
+from planner.motion.checking import CollisionChecker
+from planner.motion.collision import FastChecker, hand_hits
+from planner.motion.exact import Contact, ExactChecker
+from planner.motion.ik import ClosedFormIK
+from planner.motion.lines import CartesianPath, interpolate, track
+from planner.motion.ompl_ import PathSettings, Query, plan_path
+from planner.motion.shortcut import shortened
+from planner.motion.timing import TCP_ACCELERATION, time_line, time_path, time_path_with_stops
+from planner.motion.trajectory import Trajectory
+from planner.motion.world import FREE_MARGIN, Margins, movables
+from planner.refinement import Pair, Work
+from sim.robot import RobotModel
+from sim.scene import SceneState
+
+NOTHING: frozenset[Pair] = frozenset()
+
+SLACK = 0.0005
+"""Metres by which a pair that is near at the start may come nearer still."""
+
+DEEPEST = -0.004
+"""Distance in metres (negative: overlap) at which the arm may still start: things held or pressed give way a little."""
+
+_KNOT_SPACINGS = (0.25, 0.08)
+_ATTEMPTS = 3
+_RECENT = 12
+
+
+@dataclass(frozen=True)
+class MotionSettings:
+    """planner, goal_bias, restarts, step: see `PathSettings`. Margins in metres: of free moves as they are planned, of
+    lines near contact, of timed trajectories."""
+
+    planner: str = "RRTConnect"
+    goal_bias: float = 0.05
+    restarts: int = 3
+    step: float = 0.8
+    margin: float = FREE_MARGIN
+    line_margin: float = 0.002
+    audit_margin: float = 0.001
+
+
+class MotionPlanner:
+    """Plans motions of one robot. Every random choice follows from `seed` and the number of the query.
+
+    Counts "checks" (configurations tested for collision) and "ik" (poses solved) in `work`.
+    """
+
+    def __init__(
+        self, robot: RobotModel, seed: int = 0, settings: MotionSettings | None = None, work: Work | None = None
+    ) -> None:
+        self.robot = robot
+        self.settings = MotionSettings() if settings is None else settings
+        self.work = Work() if work is None else work
+        s = self.settings
+        self._path_settings = PathSettings(s.planner, s.goal_bias, s.restarts, s.step)
+        self._seed, self._queries = seed, 0
+        self._ik = ClosedFormIK(robot)
+        self._limits = np.stack([robot.q_min, robot.q_max])
+        self._recent: list[tuple[SceneState, Margins, ExactChecker]] = []
+
+    def free(
+        self, scene: SceneState, q: np.ndarray, allowed: frozenset[Pair] = NOTHING, margin: float | None = None
+    ) -> bool:
+        """Is q (7,) within the limits, and everything but the allowed pairs at least `margin` metres apart?"""
+        margins = Margins(self.settings.margin if margin is None else margin, allowed)
+        checker = self._exact(scene, margins)
+        self.work.add("checks")
+        return checker.is_free(q)
+
+    def hand_hits(
+        self, scene: SceneState, X_WG: SE3, allowed: frozenset[Pair] = NOTHING, margin: float | None = None
+    ) -> frozenset[str]:
+        """Names of what hand, fingers or held body would come too near to with the gripper at X_WG, wherever the arm
+        is. A cheap look before any inverse kinematics."""
+        margins = Margins(self.settings.line_margin if margin is None else margin, allowed)
+        self.work.add("checks")
+        return hand_hits(self.robot, scene, X_WG, margins)
+
+    def ik(self, X_WG: SE3) -> list[np.ndarray]:
+        """Configurations (7,) that bring the gripper to X_WG, the furthest from the joint limits first."""
+        self.work.add("ik")
+        return list(self._ik.ik(X_WG))
+
+    def lines(self, waypoints: Sequence[SE3], near: np.ndarray | None = None) -> list[np.ndarray]:
+        """Joint paths (n,7) of the gripper along the polyline of poses X_WG, best first (see `lines.track`).
+
+        `near` (7,): the configuration the arm will come from. Empty if the hand can't follow the polyline.
+        """
+        return self._track(interpolate(waypoints), near)
+
+    def legs(self, waypoints: Sequence[SE3], near: np.ndarray | None = None) -> list[list[np.ndarray]]:
+        """The same, each joint path cut at the waypoints into its legs (n,7)."""
+        path = interpolate(waypoints)
+        cuts = list(zip(path.corners[:-1], path.corners[1:], strict=True))
+        return [[q[a : b + 1] for a, b in cuts] for q in self._track(path, near)]
+
+    def line_is_free(
+        self, scene: SceneState, path: np.ndarray, allowed: frozenset[Pair] = NOTHING, margin: float | None = None
+    ) -> MotionFailure | None:
+        """None if the joint path (n,7) is free by the exact model, else what it hits.
+
+        Culprits are the movable bodies it hits, if it hits nothing else.
+        """
+        margins = Margins(self.settings.line_margin if margin is None else margin, allowed)
+        contacts = self._contacts(scene, path, margins)
+        return blame("the line comes too near:", contacts, movables(scene)) if contacts else None
+
+    def time_line(self, path: np.ndarray, tcp_speed: float, tcp_acceleration: float = TCP_ACCELERATION) -> Trajectory:
+        """Follow the joint path (n,7) of a line with the hand at tcp_speed (m/s), see `timing.time_line`."""
+        return time_line(self.robot, path, tcp_speed, tcp_acceleration)
+
+    def audit(
+        self,
+        scene: SceneState,
+        trajectory: Trajectory,
+        allowed: frozenset[Pair] = NOTHING,
+        margin: float | None = None,
+        since: float = 0.0,
+    ) -> MotionFailure | None:
+        """None if what is left of the trajectory `since` seconds after its start is free by the exact model.
+
+        What is near then already may stay as near, see `move`.
+        """
+        start = trajectory.at(since)[0]
+        margins = Margins(self.settings.audit_margin if margin is None else margin, allowed)
+        near = self._contacts(scene, start[None], margins)
+        left = trajectory.q[trajectory.times - trajectory.times[0] > since]
+        return self._audit(scene, np.concatenate([start[None], left]), _relaxed(margins, near))
+
+    def move(
+        self,
+        scene: SceneState,
+        q_goals: Sequence[np.ndarray],
+        allowed: frozenset[Pair] = NOTHING,
+        max_checks: int = 4000,
+    ) -> Trajectory | MotionFailure:
+        """A timed, audited, collision-free motion from scene.q to one of the goals (7,), or why there is none.
+
+        Where the arm starts nearer to something than the margin (after a grasp, beside a bin's wall), that
+        pair may stay as near all the way, and hardly nearer. If there is no way with everything in place,
+        but one without the movable bodies, those in that way are the culprits.
+        """
+        self._queries += 1
+        seed = int(np.random.SeedSequence([self._seed, self._queries]).generate_state(1)[0])
+        margins = Margins(self.settings.margin, allowed)
+        near = self._contacts(scene, scene.q[None], margins)
+        deep = [contact for contact in near if contact.distance < DEEPEST]
+        if deep:
+            return blame("the arm starts in collision:", deep, movables(scene))
+        margins = _relaxed(margins, near)
+        goals = self._free_goals(scene, q_goals, margins)
+        if isinstance(goals, MotionFailure):
+            return goals
+        for attempt in range(_ATTEMPTS):
+            path = self._polyline(scene, goals, margins, seed + attempt, max_checks)
+            if path is None:
+                return self._blocked(scene, goals, margins, seed, max_checks)
+            trajectory = self._timed(scene, path, margins)
+            if trajectory is not None:
+                return trajectory
+        return MotionFailure("no timed motion along the paths found keeps clear of everything")
+
+    def _track(self, path: CartesianPath, near: np.ndarray | None) -> list[np.ndarray]:
+        self.work.add("ik", len(path.poses))
+        return list(track(self._ik, path, self.robot.v_max, near))
+
+    def _free_goals(
+        self, scene: SceneState, q_goals: Sequence[np.ndarray], margins: Margins
+    ) -> list[np.ndarray] | MotionFailure:
+        within = [q for q in q_goals if np.all(q >= self._limits[0]) and np.all(q <= self._limits[1])]
+        if not within:
+            return MotionFailure("every goal lies beyond a joint limit" if len(q_goals) else "no goal was given")
+        hits = [self._contacts(scene, q[None], margins) for q in within]
+        goals = [q for q, contacts in zip(within, hits, strict=True) if not contacts]
+        if goals:
+            return goals
+        failures = [blame("the goal is in collision:", contacts, movables(scene)) for contacts in hits]
+        return min(failures, key=lambda failure: len(failure.culprits) or np.inf)
+
+    def _polyline(
+        self, scene: SceneState, goals: list[np.ndarray], margins: Margins, seed: int, max_checks: int
+    ) -> np.ndarray | None:
+        checker, reached = self._checker(scene, goals, margins)
+        path = next((np.stack([scene.q, q]) for q in reached if checker.edge_is_free(scene.q, q)), None)
+        if path is None:
+            query = Query(scene.q, reached, self._limits, seed, max_checks)
+            path = plan_path(query, checker, self._path_settings)
+            if path is not None:
+                path = shortened(path, checker, np.random.default_rng(seed))
+        self.work.add("checks", checker.checks)
+        return path
+
+    def _checker(
+        self, scene: SceneState, goals: list[np.ndarray], margins: Margins
+    ) -> tuple[CollisionChecker, list[np.ndarray]]:
+        """The fast model with the goals it accepts; the exact one if the fast refuses the start or every goal."""
+        fast = FastChecker(self.robot, scene, margins)
+        accepted = [q for q in goals if fast.is_free(q)]
+        if accepted and fast.is_free(scene.q):
+            return fast, accepted
+        return ExactChecker(self.robot, scene, margins), goals
+
+    def _blocked(
+        self, scene: SceneState, goals: list[np.ndarray], margins: Margins, seed: int, max_checks: int
+    ) -> Trajectory | MotionFailure:
+        """Who is in the way, once no path was found: a motion after all if the way without the movables hits none."""
+        reason = f"no path within {max_checks} checks"
+        movable = movables(scene)
+        path = self._polyline(scene.without(movable), goals, margins, seed, max_checks) if movable else None
+        if path is None:
+            return MotionFailure(f"{reason}, whatever is moved aside")
+        contacts = self._contacts(scene, path, margins)
+        if contacts:
+            return blame(f"{reason}; the way without movable bodies hits", contacts, movable)
+        return self._timed(scene, path, margins) or MotionFailure(reason)
+
+    def _timed(self, scene: SceneState, path: np.ndarray, margins: Margins) -> Trajectory | None:
+        margins = replace(margins, free=self.settings.audit_margin)
+        timings = [lambda spacing=spacing: time_path(self.robot, path, spacing) for spacing in _KNOT_SPACINGS]
+        for timing in (*timings, lambda: time_path_with_stops(self.robot, path)):
+            trajectory = timing()
+            if self._audit(scene, trajectory.q, margins) is None:
+                return trajectory
+        return None
+
+    def _audit(self, scene: SceneState, q: np.ndarray, margins: Margins) -> MotionFailure | None:
+        if np.any(q < self._limits[0]) or np.any(q > self._limits[1]):
+            return MotionFailure("the motion passes a joint limit")
+        contacts = self._contacts(scene, q, margins)
+        return blame("the motion comes too near:", contacts, movables(scene)) if contacts else None
+
+    def _contacts(self, scene: SceneState, path: np.ndarray, margins: Margins) -> list[Contact]:
+        checker = self._exact(scene, margins)
+        dense = checker.densified(path)
+        self.work.add("checks", len(dense))
+        return checker.contacts(dense)
+
+    def _exact(self, scene: SceneState, margins: Margins) -> ExactChecker:
+        for known, limits, checker in self._recent:
+            if known is scene and limits == margins:
+                return checker
+        checker = ExactChecker(self.robot, scene, margins)
+        self._recent = [(scene, margins, checker), *self._recent[: _RECENT - 1]]
+        return checker
+
+
+def _relaxed(margins: Margins, near: Sequence[Contact]) -> Margins:
+    return replace(margins, relaxed={contact.pair: contact.distance - SLACK for contact in near})

@@ -1,0 +1,157 @@
+"""Joint-space planning by OMPL over one of our collision checkers.
+
+A query is reproducible: its random numbers are seeded anew, and its budget is counted in checks of
+the checker. The budget ends a planner through the condition's own `terminate`, called from the
+edge check: a Python condition would be asked between, at a cost, and from other threads.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from ompl import base, geometric, util
+
+from planner.motion.checking import CollisionChecker
+
+_PLANNERS: dict[str, Callable[[base.SpaceInformation], Any]] = {
+    "RRTConnect": geometric.RRTConnect,
+    "RRT": geometric.RRT,
+    "best-of-n-RRT": geometric.RRT,
+    "RRTstar": geometric.RRTstar,
+    "InformedRRTstar": geometric.InformedRRTstar,
+    "BITstar": geometric.BITstar,
+    "AORRTC": geometric.AORRTC,
+    "PRMstar": geometric.PRMstar,
+}
+
+PLANNERS = tuple(_PLANNERS)
+"""Names that `PathSettings.planner` may have."""
+
+
+@dataclass(frozen=True)
+class PathSettings:
+    """How paths are searched.
+
+    planner: one of PLANNERS. goal_bias: share of samples that are the goal (planners that have it).
+    restarts: how often the search begins, each time with an equal part of the budget, until a path is
+    found; "best-of-n-RRT" uses them all and keeps the shortest path. step: longest edge of a
+    tree in rad (planners that have a range).
+    """
+
+    planner: str = "RRTConnect"
+    goal_bias: float = 0.05
+    restarts: int = 3
+    step: float = 0.8
+
+    def __post_init__(self) -> None:
+        if self.planner not in _PLANNERS:
+            raise ValueError(f"unknown motion planner {self.planner!r}, known: {', '.join(PLANNERS)}")
+        if self.restarts < 1:
+            raise ValueError(f"motion planner's restarts {self.restarts}, at least 1 expected")
+
+
+@dataclass(frozen=True)
+class Query:
+    """From start (7,) to any of the goals (7,), all free of collision; `limits` (2,7) bound the search; `seed` decides
+    every random choice; `max_checks` configurations may be looked at."""
+
+    start: np.ndarray
+    goals: Sequence[np.ndarray]
+    limits: np.ndarray
+    seed: int
+    max_checks: int
+
+
+def plan_path(query: Query, checker: CollisionChecker, settings: PathSettings) -> np.ndarray | None:
+    """Waypoints (n,7) of a collision-free polyline from the start to one of the goals, or None within the budget."""
+    util.setLogLevel(util.LogLevel.LOG_NONE)
+    found: list[np.ndarray] = []
+    for run in range(settings.restarts):
+        path = _search(query, checker, settings, query.seed + run, query.max_checks // settings.restarts)
+        found += [] if path is None else [path]
+        if found and settings.planner != "best-of-n-RRT":
+            break
+    return min(found, key=path_length, default=None)
+
+
+def path_length(path: np.ndarray) -> float:
+    """Length in rad of a polyline (n,7), Euclidean over the joints."""
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+class _Edges(base.MotionValidator):
+    """Asks the checker about configurations and whole edges, and ends the search when its budget is spent."""
+
+    def __init__(
+        self, information: base.SpaceInformation, checker: CollisionChecker, end: base.PlannerTerminationCondition
+    ) -> None:
+        super().__init__(information)
+        self._checker, self._end = checker, end
+        self._last = checker.checks
+
+    def allow(self, checks: int) -> None:
+        """Grant so many checks from now on."""
+        self._last = self._checker.checks + checks
+
+    def is_free(self, state: Any) -> bool:
+        """May the arm be there?"""
+        return not self._spent() and self._checker.is_free(np.array(state[0:7]))
+
+    def checkMotion(self, first: Any, second: Any) -> bool:
+        """May the arm move straight from one state to the other?"""
+        return not self._spent() and self._checker.edge_is_free(np.array(first[0:7]), np.array(second[0:7]))
+
+    def _spent(self) -> bool:
+        if self._checker.checks < self._last:
+            return False
+        self._end.terminate()
+        return True
+
+
+def _search(
+    query: Query, checker: CollisionChecker, settings: PathSettings, seed: int, max_checks: int
+) -> np.ndarray | None:
+    util.RNG.setSeed(seed % (2**31 - 1) + 1)
+    space = base.RealVectorStateSpace(7)
+    space.setBounds(_bounds(query.limits))
+    information = base.SpaceInformation(space)
+    end = base.plannerNonTerminatingCondition()
+    edges = _Edges(information, checker, end)
+    information.setStateValidityChecker(edges.is_free)
+    information.setMotionValidator(edges)
+    information.setup()
+    problem = base.ProblemDefinition(information)
+    problem.addStartState(_state(space, query.start))
+    goals = base.GoalStates(information)
+    for goal in query.goals:
+        goals.addState(_state(space, goal))
+    problem.setGoal(goals)
+    planner = _PLANNERS[settings.planner](information)
+    if hasattr(planner, "setRange"):
+        planner.setRange(settings.step)
+    if hasattr(planner, "setGoalBias"):
+        planner.setGoalBias(settings.goal_bias)
+    planner.setProblemDefinition(problem)
+    planner.setup()
+    edges.allow(max_checks)
+    planner.solve(end)
+    if not problem.hasExactSolution():
+        return None
+    solution: Any = problem.getSolutionPath()
+    return np.array([state[0:7] for state in solution.getStates()])
+
+
+def _bounds(limits: np.ndarray) -> base.RealVectorBounds:
+    bounds = base.RealVectorBounds(7)
+    for k in range(7):
+        bounds.setLow(k, float(limits[0, k]))
+        bounds.setHigh(k, float(limits[1, k]))
+    return bounds
+
+
+def _state(space: base.RealVectorStateSpace, q: np.ndarray) -> Any:
+    state: Any = space.allocState()
+    for k in range(7):
+        state[k] = float(q[k])
+    return state
