@@ -6,12 +6,10 @@ from pathlib import Path
 from scenarios.errors import SceneNotFound
 from scenarios.names import known
 
-_SUFFIXES = (".yaml", ".yml")
-
 
 def list_scenarios() -> list[str]:
     """Names of the scenes that ship with the package, sorted."""
-    return sorted(Path(entry.name).stem for entry in files("scenarios").iterdir() if entry.name.endswith(_SUFFIXES))
+    return sorted(Path(entry.name).stem for entry in files("scenarios").iterdir() if entry.name.endswith(".yaml"))
 
 
 def scenario_path(name_or_path: str | Path) -> Path:
@@ -23,7 +21,7 @@ def scenario_path(name_or_path: str | Path) -> Path:
     if text in list_scenarios():
         return Path(str(files("scenarios"))) / f"{text}.yaml"
     path = Path(name_or_path)
-    is_bare = path.name == text and path.suffix not in _SUFFIXES
+    is_bare = path.name == text and path.suffix not in (".yaml", ".yml")
     if is_bare and not _exists(path):
         raise SceneNotFound(f"unknown scene, {known(text, list_scenarios())}, or a path to a file", text)
     return path

@@ -4,10 +4,10 @@ SI units; angles in degrees, and only in keys that end in `_deg`. Frames: W is t
 Sizes are full extents. Unknown keys are errors. `json_schema` gives the same as JSON Schema.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
@@ -178,7 +178,7 @@ class Region(_Part):
         if self.open_side is None:
             raise _problem("ramp_deg", "a bin has no ramp, expected none (or kind dustpan)")
         depth = self.size["xy".index(self.open_side[1])] - self.wall
-        ramp = self.wall / np.tan(np.radians(self.ramp_deg))
+        ramp = self.wall / math.tan(math.radians(self.ramp_deg))
         if ramp >= depth:
             raise _problem("ramp_deg", f"the ramp is {ramp:.3f} m long, expected less than the inside's {depth:.3f} m")
         return self
