@@ -39,7 +39,7 @@ def test_a_body_without_noise_stays(plain, build):
 @settings(derandomize=True, max_examples=50, deadline=None)
 @given(
     seed=st.integers(0, 2**32),
-    name=st.from_regex(r"[a-z][a-z0-9_-]{0,6}", fullmatch=True),
+    name=st.text("ab7_-", max_size=6).map(lambda rest: f"x{rest}"),
     xy=st.floats(0, 0.5),
     yaw=st.floats(0, 3),
 )
