@@ -4,6 +4,8 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from scenarios.errors import SceneError, SceneInvalid, SceneMalformed, SceneNotFound, SceneUnreadable
 from scenarios.load import load_scenario
@@ -97,6 +99,44 @@ def test_a_broken_scene_is_refused_in_one_line(plain, build, old, new, place, ex
     assert expected in message
     assert "\n" not in message
     assert len(message) < 700
+
+
+SCRIBBLES = [
+    "0",
+    "-1",
+    "1e9",
+    ".nan",
+    "{",
+    "}",
+    "[",
+    ": ",
+    "- ",
+    "'",
+    "null",
+    "!",
+    "&a ",
+    "*a",
+    "? ",
+    "|",
+    "\n",
+    "#",
+    "(",
+    "\t",
+]
+
+
+@settings(
+    derandomize=True, max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(edits=st.lists(st.tuples(st.integers(0, 900), st.integers(0, 6), st.sampled_from(SCRIBBLES)), max_size=3))
+def test_a_scribbled_scene_loads_or_is_refused_in_one_line(plain, build, edits):
+    text = plain
+    for at, length, scribble in edits:
+        text = text[:at] + scribble + text[at + length :]
+    try:
+        build(text, 1)
+    except SceneError as error:
+        assert "\n" not in str(error)
 
 
 def test_of_several_problems_the_first_is_told_and_the_rest_counted(plain, build):
