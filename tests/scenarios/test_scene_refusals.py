@@ -133,10 +133,12 @@ def test_a_scribbled_scene_loads_or_is_refused_in_one_line(plain, build, edits):
     text = plain
     for at, length, scribble in edits:
         text = text[:at] + scribble + text[at + length :]
+    message = ""
     try:
         build(text, 1)
     except SceneError as error:
-        assert "\n" not in str(error)
+        message = str(error)
+    assert "\n" not in message
 
 
 def test_of_several_problems_the_first_is_told_and_the_rest_counted(plain, build):
