@@ -4,7 +4,7 @@ import numpy as np
 
 from skills.control.force import smooth_step
 
-FADING = 0.08
+FADING = 0.1
 """Seconds until the old law's torque has gone."""
 
 
@@ -20,6 +20,10 @@ class Bridge:
         """Begin with the offset `jump` (7,), old torque minus new."""
         self._jump = jump
         self._time = 0.0
+
+    def drop(self) -> None:
+        """No offset any more."""
+        self._time = FADING
 
     def advance(self) -> np.ndarray:
         """The offset (7,) after one more period."""

@@ -15,8 +15,9 @@ _GRAVITY = np.array([0.0, 0.0, -GRAVITY])
 class ContactWrench:
     """Wrench that the world exerts on the tool, at G in W axes (6,): `raw`, and `smooth` (low-passed).
 
-    The sensor also feels the weight and inertia of the hand and its load: both are taken off, the
-    accelerations coming from the model (smooth) instead of differences of measurements (noise).
+    The sensor also feels the weight and inertia of the hand and its load: both are taken off. The
+    acceleration is the difference of measured velocities: one predicted by the model would miss what
+    the contact itself does to the arm, up to half of the force in directions in which the arm is light.
     """
 
     def __init__(self, robot: RobotModel, period: float) -> None:
@@ -24,6 +25,8 @@ class ContactWrench:
         self._data = robot.data()
         self._hand = hand_inertia(robot)
         self._beyond_sensor = self._hand
+        self._period = period
+        self._last_v: np.ndarray | None = None
         self._blend = 1.0 - np.exp(-period / SMOOTHING)
         self._bias_G = np.zeros(6)
         self._smooth_G = np.zeros(6)
@@ -39,8 +42,10 @@ class ContactWrench:
         self._bias_G = self._bias_G + self._smooth_G
         self._smooth_G = np.zeros(6)
 
-    def update(self, q: np.ndarray, v: np.ndarray, a: np.ndarray, wrist: Wrench) -> None:
-        """Read the sensor at configuration q, velocity v and the model's acceleration a (7,)."""
+    def update(self, q: np.ndarray, v: np.ndarray, wrist: Wrench) -> None:
+        """Read the sensor at configuration q and velocity v (7,), once every period."""
+        a = np.zeros(7) if self._last_v is None else (v - self._last_v) / self._period
+        self._last_v = v
         robot, data = self._robot, self._data
         pin.forwardKinematics(robot.model, data, q, v, a)
         rotation = pin.updateFramePlacement(robot.model, data, robot.tcp_id).rotation

@@ -66,7 +66,6 @@ class ArmController:
         self._course = Course(Trajectory.standstill(np.zeros(7)))
         self._state: ArmState | None = None
         self._tau: np.ndarray | None = None
-        self._a = np.zeros(7)
         self._pressed = False
         self._anchor = 0.0
         self._without_contact = 0.0
@@ -169,15 +168,16 @@ class ArmController:
         """Torques (7,) in Nm for the next period."""
         state = measure(self._robot, self._data, observation.q, observation.v)
         self._state = state
-        self._wrench.update(state.q, state.v, self._a, observation.wrist)
+        self._wrench.update(state.q, state.v, observation.wrist)
         if self._pending is not None:
             self._begin(self._pending, state)
         elif self._hold_pending:
             self._begin_hold(state)
         self._watch_contact(state)
+        if self._law_changed:
+            self._bridge.drop()
         tasks, wrench = self._law(state)
         solution = self._qp.solve(state, tasks, self._bridge.advance() - state.J.T @ wrench)
-        self._a = solution.a
         self._course.advance(self._period)
         tau = solution.tau
         if self._law_changed and self._tau is not None:
@@ -244,7 +244,7 @@ class ArmController:
         assert reference.stiffness is not None
         if self._pressed:
             target = self._pressed_target(target, reference)
-        return [PoseTask(target, reference.stiffness), posture], _NO_WRENCH
+        return [PoseTask(target, reference.stiffness, self._period), posture], _NO_WRENCH
 
     def _pressed_target(self, target: Target, reference: Reference) -> Target:
         """The target in the plane through the touched point, below it by force over stiffness."""

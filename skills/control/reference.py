@@ -9,7 +9,7 @@ from planner.motion.trajectory import Trajectory
 
 Mode = Literal["position", "impedance", "hybrid"]
 
-SHORTEST_JOINING = 0.1
+SHORTEST_JOINING = 0.15
 """Seconds in which a difference between the arm and the trajectory's start fades, at least."""
 
 
@@ -60,45 +60,63 @@ class Reference:
         return self.R_WC[:, 2]
 
 
+class Fade:
+    """A difference in joint position and velocity (7,) each that goes to zero in `duration` seconds, along a
+    quintic that begins and ends without acceleration."""
+
+    def __init__(self, gap: np.ndarray, slip: np.ndarray, duration: float) -> None:
+        self._gap, self._slip = gap, slip
+        self.duration = duration
+
+    def at(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The difference (7,), its velocity and acceleration after t seconds."""
+        if t >= self.duration:
+            return _STILL, _STILL, _STILL
+        T = self.duration
+        s = t / T
+        gap, slip = self._gap, self._slip * T
+        position = gap * (1 - s**3 * (10 - 15 * s + 6 * s * s)) + slip * (s - s**3 * (6 - 8 * s + 3 * s * s))
+        velocity = gap * (-30 * s * s * (1 - s) ** 2) + slip * (1 - s * s * (18 - 32 * s + 15 * s * s))
+        acceleration = gap * (-60 * s * (1 - s) * (1 - 2 * s)) + slip * (-s * (36 - 96 * s + 60 * s * s))
+        return position, velocity / T, acceleration / T**2
+
+
 class Course:
     """Progress along a trajectory. Where the arm isn't at its start when it begins, the difference
-    (in position and velocity) fades along a cubic instead of being jumped."""
+    (in position and velocity) fades instead of being jumped."""
 
-    def __init__(self, trajectory: Trajectory, joining: Trajectory | None = None) -> None:
-        self._trajectory = trajectory
-        self._joining = joining
+    def __init__(self, trajectory: Trajectory, fade: Fade | None = None) -> None:
+        self.trajectory = trajectory
+        self._fade = fade
         self._frozen: np.ndarray | None = None
-        self.time = 0.0
-        self._elapsed = 0.0
+        self.time = self._elapsed = _BEGUN
 
     @staticmethod
     def joined(trajectory: Trajectory, q: np.ndarray, v: np.ndarray, a_max: np.ndarray) -> "Course":
-        """Begin from where the arm is (q, v (7,)), joining with at most about half of a_max (7,)."""
-        q0, v0, _ = trajectory.at(0.0)
+        """Begin from where the arm is (q, v (7,)), spending about a_max (7,) rad/s² on joining the trajectory."""
+        q0, v0, _ = trajectory.at(_BEGUN)
         gap, slip = q - q0, v - v0
-        by_gap = np.sqrt(6.0 * np.abs(gap) / (0.5 * a_max)).max()
-        by_slip = (4.0 * np.abs(slip) / (0.5 * a_max)).max()
-        duration = max(SHORTEST_JOINING, float(by_gap), float(by_slip))
-        return Course(trajectory, _fading(gap, slip, duration))
+        # Peak accelerations of the quintic: 5.8 gap/T² and 3.9 slip/T.
+        by_gap = np.sqrt(5.8 * np.abs(gap) / a_max).max()
+        by_slip = (3.9 * np.abs(slip) / a_max).max()
+        return Course(trajectory, Fade(gap, slip, max(SHORTEST_JOINING, float(by_gap), float(by_slip))))
 
     @staticmethod
     def stop(q: np.ndarray, v: np.ndarray, a_max: np.ndarray) -> "Course":
-        """Come to rest from q, v (7,) by constant deceleration of at most half of a_max (7,), and stay."""
-        duration = max(SHORTEST_JOINING, float((np.abs(v) / (0.5 * a_max)).max()))
+        """Come to rest from q, v (7,), braking with at most a_max (7,) rad/s², and stay."""
+        # With a gap of v T/2 the quintic's velocity falls monotonously, braking with 1.5 v/T at most.
+        duration = max(SHORTEST_JOINING, float((1.5 * np.abs(v) / a_max).max()))
         rest = q + v * duration / 2
-        return Course(Trajectory.standstill(rest), _fading(q - rest, v, duration))
-
-    @property
-    def trajectory(self) -> Trajectory:
-        return self._trajectory
+        return Course(Trajectory.standstill(rest), Fade(q - rest, v, duration))
 
     @property
     def over(self) -> bool:
-        """Whether the trajectory's time is over and the start's difference has faded."""
-        joined = self._joining is None or self._elapsed >= self._joining.duration
-        return joined and self.time >= self._trajectory.duration
+        """Whether the trajectory's time is over and the difference at its start has faded."""
+        joined = self._fade is None or self._elapsed >= self._fade.duration
+        return joined and self.time >= self.trajectory.duration
 
     def advance(self, period: float) -> None:
+        """Let `period` seconds pass."""
         self._elapsed += period
         if self._frozen is None:
             self.time += period
@@ -111,15 +129,14 @@ class Course:
         """Where the joints should be: position, velocity and acceleration (7,)."""
         if self._frozen is not None:
             return self._frozen, _STILL, _STILL
-        q, v, a = self._trajectory.at(self.time)
-        if self._joining is None or self._elapsed >= self._joining.duration:
+        q, v, a = self.trajectory.at(self.time)
+        if self._fade is None or self._elapsed >= self._fade.duration:
             return q, v, a
-        dq, dv, da = self._joining.at(self._elapsed)
+        dq, dv, da = self._fade.at(self._elapsed)
         return q + dq, v + dv, a + da
 
 
-def _fading(gap: np.ndarray, slip: np.ndarray, duration: float) -> Trajectory:
-    return Trajectory(np.array([0.0, duration]), np.stack([gap, np.zeros(7)]), np.stack([slip, np.zeros(7)]))
-
-
 _STILL = np.zeros(7)
+
+_BEGUN = 1e-9
+"""Seconds after the start: at 0 itself a trajectory still stands."""
