@@ -29,6 +29,9 @@ from planner.task.symbols import Fact, GroundAction, NoTaskPlan, Step, TaskPlan
 from scenarios.names import known
 from sim.scene import SceneState
 
+MAX_PROBES = 3
+"""Further actions that are looked at, at most, when one like them was found obstructed."""
+
 
 @dataclass(frozen=True)
 class PlanSettings:
@@ -101,13 +104,11 @@ class SearchThenSample:
 
     def facts(self, scene: SceneState) -> frozenset[Fact]:
         """What holds in a scene as observed, in the predicates of the domain."""
-        if self._given is not None:
-            return self._given.facts(self._domain, scene, self.learned)
-        return stated_in(self._domain, self._objects(scene), facts(scene, self.learned))
+        return self._facts(scene, self.learned)
 
     def plan(self, scene: SceneState, goal: frozenset[Fact], rng: np.random.Generator, work: Work) -> Solution | NoPlan:
         """A plan from the scene as observed, refined whole, or why there is none."""
-        self.learned.observe(scene)
+        self.learned.begin(scene)
         self._actions.forget()
         try:
             outcome = self._rounds(scene, goal, rng, work)
@@ -178,14 +179,9 @@ class SearchThenSample:
         self, scene: SceneState, goal: frozenset[Fact], learned: Learned, work: Work, number: int
     ) -> tuple[Problem, TaskPlan | NoTaskPlan]:
         """State what is believed, given what was learned, and let the task planner search."""
-        objects = self._objects(scene)
-        if self._given is not None:
-            init = self._given.facts(self._domain, scene, learned)
-        else:
-            init = stated_in(self._domain, objects, facts(scene, learned))
-        objects = {name: type_ for name, type_ in objects.items() if name not in self._domain.constants}
-        observed = Problem(f"round-{number}", self._domain.name, objects, init, goal)
-        domain, problem = with_constraints(self._domain, observed, learned.constraints())
+        objects = {n: kind for n, kind in self._objects(scene).items() if n not in self._domain.constants}
+        stated = Problem(f"round-{number}", self._domain.name, objects, self._facts(scene, learned), goal)
+        domain, problem = with_constraints(self._domain, stated, learned.constraints())
         texts = write_domain(domain), write_problem(problem)
         found = self._task_planner.solve(*texts, self._settings.max_expansions)
         work.add("expansions", found.expansions)
@@ -203,11 +199,12 @@ class SearchThenSample:
         self._take_in(stuck.failure, stuck.situation, stuck.hinted)
         if not stuck.failure.culprit_sets:
             return
-        for step in rest:
-            if step.action.name == stuck.failure.action.name and step.applicable(stuck.situation.facts):
-                outcome, hinted = self._actions.refine(step.action, stuck.situation, rng, self._budget, work)
-                if isinstance(outcome, RefinementFailure):
-                    self._take_in(outcome, stuck.situation, hinted)
+        kin = [step.action for step in rest if step.action.name == stuck.failure.action.name]
+        possible = {step.action for step in rest if step.applicable(stuck.situation.facts)}
+        for action in [action for action in kin if action in possible][:MAX_PROBES]:
+            outcome, hinted = self._actions.refine(action, stuck.situation, rng, self._budget, work)
+            if isinstance(outcome, RefinementFailure):
+                self._take_in(outcome, stuck.situation, hinted)
 
     def _take_in(self, failure: RefinementFailure, situation: Situation, hinted: tuple[Any, ...]) -> None:
         self.learned.learn(failure, situation, hinted, self._budget.tries)
@@ -260,6 +257,11 @@ class SearchThenSample:
         if self._given is not None:
             return {**self._domain.constants, **self._given.problem.objects}
         return objects_of(scene)
+
+    def _facts(self, scene: SceneState, learned: Learned) -> frozenset[Fact]:
+        if self._given is not None:
+            return self._given.facts(self._domain, scene, learned)
+        return stated_in(self._domain, self._objects(scene), facts(scene, learned))
 
     def _state(self, scene: SceneState) -> frozenset[Fact]:
         return stated_in(self._domain, self._objects(scene), observed_facts(scene))

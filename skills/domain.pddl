@@ -18,6 +18,7 @@
     (hand_empty)
     (is_sponge ?s - tool)
     (graspable ?o - solid)            ; nothing known speaks against a grasp as it lies
+    (stuck ?o - solid)                ; there is no way to pick it as it lies
     (away ?o - thing)                 ; isn't where it is known to be in the way
   )
   (:action pick
@@ -42,7 +43,7 @@
   )
   (:action drag
     :parameters (?o - solid ?on - tabletop)
-    :precondition (and (in_bin ?o ?on) (hand_empty))
+    :precondition (and (in_bin ?o ?on) (stuck ?o) (hand_empty))
     :effect (and (graspable ?o) (away ?o))
   )
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 from planner.task.facts import OBSERVED, Optimism, facts, objects_of, observed_facts, stated_in
 from planner.task.pddl import Domain, Problem
 from planner.task.pddl_reader import read_domain, read_problem, read_text
-from planner.task.primitives import AWAY, GRASPABLE, adapted, with_away
+from planner.task.primitives import AWAY, GRASPABLE, STUCK, adapted, with_away
 from planner.task.sexpr import PddlError
 from planner.task.situation import is_displaced, whereabouts
 from planner.task.symbols import Fact
@@ -36,7 +36,7 @@ class Given:
             if fact.predicate == GRASPABLE
             and not is_displaced(whereabouts(self.start, fact.args[0]), whereabouts(scene, fact.args[0]))
         }
-        own = {fact for fact in init if fact.predicate not in OBSERVED | {AWAY, GRASPABLE}}
+        own = {fact for fact in init if fact.predicate not in OBSERVED | {AWAY, GRASPABLE, STUCK}}
         return (known_now - stiff) | own
 
 

@@ -105,12 +105,15 @@ class Learned:
         self._cases: dict[tuple[GroundAction, Spot], Case] = {}
         self._never: dict[GroundAction, str] = {}
         self._seen: dict[str, Whereabouts | None] = {}
+        self._is_lenient = False
+        self._binding: frozenset[str] | None = None
 
     def learn(self, failure: RefinementFailure, situation: Situation, hinted: Collection[Any], tries: int) -> None:
         """Take in that an action can't be refined in a situation, with a budget of so many tries.
 
         `hinted` are the samples that were to be tried first: those not among the attempts are spent too.
         """
+        self._binding = None
         if failure.proof == "anywhere":
             self._never[failure.action] = failure.reason
             return
@@ -131,6 +134,7 @@ class Learned:
 
         Returns whether the action counts as failed there now.
         """
+        self._binding = None
         situation = Situation.now(scene)
         own = situation.spot(failure.action.args[0])
         case = self._cases.setdefault((failure.action, own), Case())
@@ -169,19 +173,34 @@ class Learned:
         proven = Learned(self._domain)
         proven._cases = {key: case for key, case in self._cases.items() if case.is_proof}
         proven._never, proven._seen = self._never, self._seen
+        proven._is_lenient = self._is_lenient
         return proven
 
     def __bool__(self) -> bool:
         return bool(self._never) or any(case.has_failed for case in self._cases.values())
 
-    def is_graspable(self, name: str, scene: SceneState) -> bool:
-        """Does nothing learned speak against grasping the body as it lies?"""
-        facts = (key for key, case in self._cases.items() if case.has_failed and self._is_grasp_fact(*key))
-        return not any(own.body == name for _, own in facts) or self._has_moved(name, scene)
+    def ungraspable(self, scene: SceneState) -> frozenset[str]:
+        """Bodies known to have no grasp as they lie."""
+        found = {own.body for action, own in self._failed() if self._is_grasp_fact(action, own)}
+        return self._still_there(found, scene)
 
-    def is_away(self, name: str, scene: SceneState) -> bool:
-        """Is the body not where it is known to be in the way?"""
-        return Spot(name) not in self._binding_spots() or self._has_moved(name, scene)
+    def stuck(self, scene: SceneState) -> frozenset[str]:
+        """Bodies that can't be taken up as they lie and must be moved otherwise first.
+
+        Those that are merely surrounded are among them only once a budget was widened: what surrounds them goes first.
+        """
+        never = frozenset(action.args[0] for action in self._never if action.name in self._grasping)
+        if not self._is_lenient:
+            return self.ungraspable(scene) | never
+        taken = {own.body for action, own in self._failed() if action.name in self._grasping and own.left_by is None}
+        return self._still_there(taken, scene) | never
+
+    def in_the_way(self, scene: SceneState) -> frozenset[str]:
+        """Bodies that lie where they are known to be in the way."""
+        if self._binding is None:
+            spots = (spot for options in self.constraints().values() for needs in options for spot in needs)
+            self._binding = frozenset(spot.body for spot in spots if spot.left_by is None)
+        return self._still_there(self._binding, scene)
 
     def observe(self, scene: SceneState) -> frozenset[str]:
         """Void what was learned of bodies that lie elsewhere now; returns their names."""
@@ -190,6 +209,11 @@ class Learned:
         for name in moved:
             del self._seen[name]
         return moved
+
+    def begin(self, scene: SceneState) -> None:
+        """Void what the scene contradicts, before another plan is sought with the budgets one begins with."""
+        self._is_lenient = False
+        self.observe(scene)
 
     def forget_predicted(self) -> None:
         """Drop what was learned of poses that only a plan would have brought about."""
@@ -202,6 +226,7 @@ class Learned:
 
     def retract(self, tries: int) -> None:
         """Drop sampled facts established with fewer tries. What failed in execution is still avoided, proofs stay."""
+        self._is_lenient, self._binding = True, None
         for key, case in list(self._cases.items()):
             if not case.is_proof and case.tries < tries:
                 executed = {sample: kept for sample, kept in case.samples.items() if kept.is_executed}
@@ -248,8 +273,11 @@ class Learned:
         case = self._cases[action, own]
         return action.name in self._grasping and own.left_by is None and (case.is_proof or not case.minimal())
 
-    def _binding_spots(self) -> frozenset[Spot]:
-        return frozenset(spot for options in self.constraints().values() for needs in options for spot in needs)
+    def _failed(self) -> list[tuple[GroundAction, Spot]]:
+        return [key for key, case in self._cases.items() if case.has_failed]
+
+    def _still_there(self, names: Iterable[str], scene: SceneState) -> frozenset[str]:
+        return frozenset(name for name in names if not self._has_moved(name, scene))
 
     def _has_moved(self, name: str, scene: SceneState) -> bool:
         return name in self._seen and is_displaced(self._seen[name], whereabouts(scene, name))
@@ -260,6 +288,7 @@ class Learned:
                 self._seen.setdefault(spot.body, whereabouts(situation.observed, spot.body))
 
     def _drop(self, is_gone: Callable[[Spot], bool]) -> None:
+        self._binding = None
         self._cases = {key: case for key, case in self._cases.items() if not is_gone(key[1])}
         for case in self._cases.values():
             case.forget(is_gone)

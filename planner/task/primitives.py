@@ -23,6 +23,9 @@ AWAY = "away"
 GRASPABLE = "graspable"
 """graspable(body): nothing learned speaks against grasping the body as it lies."""
 
+STUCK = "stuck"
+"""stuck(body): the body can't be taken up as it lies, and must be moved otherwise first."""
+
 
 def primitive(schema_name: str) -> str:
     """The primitive that a schema stands for."""
@@ -89,7 +92,7 @@ def adapted(domain: Domain, primitives: Mapping[str, int], file: str) -> Domain:
     for name, parameters in domain.predicates.items():
         if VARIANT in name:
             raise PddlError(f"predicate {name!r}: {VARIANT!r} is kept for learned ones, expected another name", file)
-        if name in (AWAY, GRASPABLE) and len(parameters) != 1:
+        if name in (AWAY, GRASPABLE, STUCK) and len(parameters) != 1:
             raise PddlError(f"predicate {name!r} has {len(parameters)} parameters, expected 1", file)
     return replace(domain, actions=tuple(_adapted(schema, domain, primitives, file) for schema in domain.actions))
 

@@ -16,10 +16,10 @@ from planner.task.pddl_reader import read_domain, read_problem
 from planner.task.primitives import ground
 from planner.task.symbols import Fact, NoTaskPlan, Step, TaskPlan
 
-SMALL = 60
+SMALL = 40
 """Ground operators up to which A* with h^max is tried first by `auto`."""
 
-SMALL_EXPANSIONS = 400
+SMALL_EXPANSIONS = 300
 """Nodes after which `auto` gives up A* with h^max and goes on with weighted A* and h^FF."""
 
 WEIGHT = 5

@@ -24,28 +24,30 @@ def at(x: float, y: float, z: float = 0.0) -> SE3:
     return SE3(np.eye(3), np.array([x, y, z]))
 
 
-@pytest.fixture
-def tabletop() -> Callable[..., SceneState]:
-    """A table of 1 m × 1 m with its top at z = 0, a bin on either side, a tray beyond its far edge, a sponge in it."""
+def tabletop_scene(solid: str = "", crumbs: str = "", bins: tuple[str, ...] = ("left_bin", "right_bin")) -> SceneState:
+    """A table of 1 m × 1 m with its top at z = 0, bins beside it, a tray beyond its far edge, a sponge in the tray."""
+    bodies = {}
+    for index, name in enumerate(solid.split()):
+        x, y = -0.4 + 0.12 * (index % 7), -0.4 + 0.12 * (index // 7)
+        bodies[name] = Body(name, Box((0.06, 0.06, 0.06)), 0.3, 0.5, GREY, at(x, y, 0.03))
+    for index, name in enumerate(crumbs.split()):
+        bodies[name] = Body(name, Box((0.02, 0.02, 0.02)), 0.01, 0.5, GREY, at(0.45, -0.4 + 0.05 * index, 0.01))
+    bodies["sponge"] = Body("sponge", Box((0.1, 0.06, 0.04)), 0.05, 0.5, GREY, at(0.75, 0, -0.08), tool="sponge")
+    regions = {
+        name: Region(name, "bin", (0.5, 0.5, 0.2), 0.01, at(0, 1.0 + index, -0.1), 0.5)
+        for index, name in enumerate(bins)
+    }
+    regions["dustpan"] = Region("dustpan", "dustpan", (0.4, 0.4, 0.1), 0.01, at(0.75, 0, -0.06), 0.5, "-x")
+    robot = RobotPlacement("iiwa14_wsg50", SE3.Identity(), Q)
+    table = Table((1.0, 1.0, 0.05), at(0, 0, -0.025), 0.5)
+    return SceneState.initial(Scenario("hand-made", 0, robot, table, regions, {}, bodies, ""), 0.1)
 
-    def scene(solid: str = "", crumbs: str = "", bins: tuple[str, ...] = ("left_bin", "right_bin")) -> SceneState:
-        bodies = {}
-        for index, name in enumerate(solid.split()):
-            x, y = -0.4 + 0.12 * (index % 7), -0.4 + 0.12 * (index // 7)
-            bodies[name] = Body(name, Box((0.06, 0.06, 0.06)), 0.3, 0.5, GREY, at(x, y, 0.03))
-        for index, name in enumerate(crumbs.split()):
-            bodies[name] = Body(name, Box((0.02, 0.02, 0.02)), 0.01, 0.5, GREY, at(0.45, -0.4 + 0.05 * index, 0.01))
-        bodies["sponge"] = Body("sponge", Box((0.1, 0.06, 0.04)), 0.05, 0.5, GREY, at(0.75, 0, -0.08), tool="sponge")
-        regions = {
-            name: Region(name, "bin", (0.5, 0.5, 0.2), 0.01, at(0, 1.0 + index, -0.1), 0.5)
-            for index, name in enumerate(bins)
-        }
-        regions["dustpan"] = Region("dustpan", "dustpan", (0.4, 0.4, 0.1), 0.01, at(0.75, 0, -0.06), 0.5, "-x")
-        robot = RobotPlacement("iiwa14_wsg50", SE3.Identity(), Q)
-        table = Table((1.0, 1.0, 0.05), at(0, 0, -0.025), 0.5)
-        return SceneState.initial(Scenario("hand-made", 0, robot, table, regions, {}, bodies, ""), 0.1)
 
-    return scene
+def lies_at_start(scene: SceneState, name: str) -> bool:
+    """Does a body lie where the scenario has it?"""
+    is_held = scene.held is not None and scene.held.name == name
+    start = scene.scenario.bodies[name].X_WO.translation
+    return not is_held and bool(np.allclose(scene.poses[name].translation, start))
 
 
 Blocking = Callable[[GroundAction, int, SceneState], set[str] | None]
@@ -107,17 +109,15 @@ class StandIn:
 
 
 @pytest.fixture
+def tabletop() -> Callable[..., SceneState]:
+    return tabletop_scene
+
+
+@pytest.fixture
 def stand_in() -> type[StandIn]:
     return StandIn
 
 
 @pytest.fixture
 def is_at_start() -> Callable[[SceneState, str], bool]:
-    """Does a body lie where the scenario has it?"""
-
-    def check(scene: SceneState, name: str) -> bool:
-        is_held = scene.held is not None and scene.held.name == name
-        start = scene.scenario.bodies[name].X_WO.translation
-        return not is_held and bool(np.allclose(scene.poses[name].translation, start))
-
-    return check
+    return lies_at_start

@@ -219,7 +219,7 @@ def statable(domain, terms):
     return found
 
 
-@settings(max_examples=60, derandomize=True, deadline=None)
+@settings(max_examples=40, derandomize=True, deadline=None)
 @given(domains(), st.data())
 def test_writing_and_reading_are_inverse(domain, data):
     assert read_domain(write_domain(domain)) == domain

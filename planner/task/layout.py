@@ -1,0 +1,116 @@
+"""What never changes in a scenario, prepared for stating facts often: surfaces as spans, bodies by kind."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from pinocchio import SE3
+
+from scenarios.goal import is_crumb
+from scenarios.names import TABLE
+from scenarios.regions import interior
+from scenarios.scenario import Body, Scenario
+from scenarios.shapes import Box, Cylinder, Shape, Sphere
+
+REST_ABOVE = 0.02
+REST_BELOW = 0.01
+"""Metres that a body's lowest point may lie above or below a surface on which it counts as resting."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """Points p of W with low ≤ axis · p ≤ high: a slab between two parallel planes, in metres."""
+
+    axis: tuple[float, float, float]
+    low: float
+    high: float
+
+    def holds(self, p: tuple[float, float, float]) -> bool:
+        """Is the point (3,) of W between the planes?"""
+        x, y, z = self.axis
+        return self.low <= x * p[0] + y * p[1] + z * p[2] <= self.high
+
+
+class Layout:
+    """A scenario's regions and table as spans, and the PDDL type of each of its bodies and surfaces."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.kinds = {name: _kind(body, scenario.robot.model) for name, body in scenario.bodies.items()}
+        self.sponges = frozenset(name for name, body in scenario.bodies.items() if body.tool == "sponge")
+        self.surfaces = {**{name: region.kind for name, region in scenario.regions.items()}, TABLE: "tabletop"}
+        self.bins = frozenset(name for name, kind in self.surfaces.items() if kind == "bin")
+        self._shapes = {name: body.shape for name, body in scenario.bodies.items()}
+        self._regions = []
+        for name, region in scenario.regions.items():
+            lower, upper = interior(region)
+            spans = _spans(region.X_WR, lower - [0.0, 0.0, REST_BELOW], upper)
+            self._regions.append((name, spans))
+        table = scenario.table
+        half = np.array(table.size) / 2
+        *self._plate, top = _spans(table.X_WT, -half, half)
+        self._up, self._top = np.array(top.axis), top.high
+
+    def place_of(self, name: str, X_WO: SE3) -> str | None:
+        """The region in which a body's centre lies, or the table on which it rests, or None."""
+        x, y, z = X_WO.translation.tolist()
+        p_W = (x, y, z)
+        for region, spans in self._regions:
+            if all(span.holds(p_W) for span in spans):
+                return region
+        if all(span.holds(p_W) for span in self._plate):
+            lowest = float(self._up @ X_WO.translation) - _depth(self._shapes[name], X_WO.rotation.T @ self._up)
+            if -REST_BELOW <= lowest - self._top <= REST_ABOVE:
+                return TABLE
+        return None
+
+
+def layout(scenario: Scenario) -> Layout:
+    """The scenario's layout; the same object for the same scenario."""
+    return _layout(_Identity(scenario))
+
+
+class _Identity:
+    """Makes an object a key by what it is, not what it holds."""
+
+    def __init__(self, it: Any) -> None:
+        self.it = it
+
+    def __hash__(self) -> int:
+        return id(self.it)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Identity) and self.it is other.it
+
+
+@lru_cache(maxsize=8)
+def _layout(scenario: _Identity) -> Layout:
+    return Layout(scenario.it)
+
+
+def _kind(body: Body, model: str) -> str:
+    if body.tool is not None:
+        return "tool"
+    return "crumb" if is_crumb(body, model) else "movable"
+
+
+def _spans(X_WS: SE3, lower: np.ndarray, upper: np.ndarray) -> tuple[Span, ...]:
+    """The box between two corners (3,), given in S, as three slabs of W along the axes of S."""
+    spans = []
+    for i in range(3):
+        axis = X_WS.rotation[:, i]
+        offset = float(axis @ X_WS.translation)
+        x, y, z = axis.tolist()
+        spans.append(Span((x, y, z), offset + float(lower[i]), offset + float(upper[i])))
+    return tuple(spans)
+
+
+def _depth(shape: Shape, up: np.ndarray) -> float:
+    """How far the shape reaches below its centre, in metres; `up` (3,) is the way up in its own frame."""
+    match shape:
+        case Box(size):
+            return float(np.abs(up) @ np.array(size)) / 2
+        case Cylinder(radius, height):
+            return float(np.hypot(up[0], up[1]) * radius + abs(up[2]) * height / 2)
+        case Sphere(radius):
+            return radius
