@@ -66,15 +66,19 @@ class Trajectory:
         i = int(np.searchsorted(self.times, s, side="right")) - 1
         h = self.times[i + 1] - self.times[i]
         u = (s - self.times[i]) / h
-        q0, q1 = self.q[i], self.q[i + 1]
-        m0, m1 = h * self.v[i], h * self.v[i + 1]
-        d = q1 - q0
-        c2 = 3 * d - 2 * m0 - m1
-        c3 = m0 + m1 - 2 * d
-        q = q0 + u * (m0 + u * (c2 + u * c3))
-        v = (m0 + u * (2 * c2 + 3 * u * c3)) / h
-        a = (2 * c2 + 6 * u * c3) / h**2
+        powers = np.array(
+            [[1.0, u, u * u, u * u * u], [0.0, 1 / h, 2 * u / h, 3 * u * u / h], [0.0, 0.0, 2 / h**2, 6 * u / h**2]]
+        )
+        q, v, a = powers @ self._coefficients[i]
         return q, v, a
+
+    @cached_property
+    def _coefficients(self) -> np.ndarray:
+        """Coefficients (n-1,4,7) of each segment's cubic in its own time from 0 to 1."""
+        h = np.diff(self.times)[:, None]
+        m0, m1 = h * self.v[:-1], h * self.v[1:]
+        d = np.diff(self.q, axis=0)
+        return np.stack([self.q[:-1], m0, 3 * d - 2 * m0 - m1, m0 + m1 - 2 * d], axis=1)
 
     def sampled(self, step: float) -> np.ndarray:
         """Configurations (k,7) every `step` seconds, both ends included."""
