@@ -7,7 +7,7 @@ turned about their axes of symmetry.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -56,21 +56,19 @@ def open_width(gripper: Gripper, width: float) -> float:
     return min(gripper.stroke, width + 0.03)
 
 
-def grasps(
-    shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.random.Generator
-) -> Iterator[Grasp]:
+def grasps(shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.random.Generator) -> Iterator[Grasp]:
     """Grasps of a shape that lies at X_WO, best first: from above, near the centre, away from the robot's base (3,).
 
-    Lazy; ends when all are given. `rng` breaks ties, so that another seed tries another order.
+    Ends when all are given. `rng` breaks ties, so that another seed tries another order.
     """
-    scored = []
-    for R_OF in _symmetries(shape):
-        for grasp in _box_grasps(extents(shape), R_OF, gripper):
-            R_WG = X_WO.rotation @ grasp.X_OG.rotation
-            scored.append((_score(grasp, R_WG, X_WO, base) + JITTER * rng.random(), len(scored), grasp))
-    scored.sort(key=lambda entry: (-entry[0], entry[1]))
-    for _, _, grasp in scored:
-        yield grasp
+    found = _candidates(shape, gripper)
+    approach = found.R[:, :, 2] @ X_WO.rotation.T
+    outward = (X_WO.translation - base) * np.array([1.0, 1.0, 0.0])
+    outward = outward / max(float(np.linalg.norm(outward)), 1e-6)
+    offset = np.linalg.norm(np.cross(found.p, found.R[:, :, 2]), axis=1)
+    score = -approach[:, 2] + 0.5 * approach @ outward - 4.0 * offset + JITTER * rng.random(len(offset))
+    for index in np.argsort(-score, kind="stable"):
+        yield Grasp.at(SE3(found.R[index], found.p[index]), float(found.width[index]))
 
 
 def tool_grasps(
@@ -86,13 +84,25 @@ def tool_grasps(
             yield grasp
 
 
-def _score(grasp: Grasp, R_WG: np.ndarray, X_WO: SE3, base: np.ndarray) -> float:
-    approach = R_WG[:, 2]
-    outward = X_WO.translation - base
-    outward[2] = 0.0
-    outward = outward / max(float(np.linalg.norm(outward)), 1e-6)
-    offset = float(np.linalg.norm(np.cross(X_WO.rotation @ np.array(grasp.position), approach)))
-    return float(-approach[2] + 0.5 * approach @ outward) - 4.0 * offset
+@dataclass(frozen=True)
+class _Candidates:
+    """Grasps as arrays: rotations R_OG (n,3,3), positions p_OG (n,3) and widths (n,)."""
+
+    R: np.ndarray
+    p: np.ndarray
+    width: np.ndarray
+
+
+@lru_cache(maxsize=256)
+def _candidates(shape: Shape, gripper: Gripper) -> _Candidates:
+    found = [
+        (R_OF @ R_FG, R_OF @ p_FG, width)
+        for R_OF in _symmetries(shape)
+        for R_FG, p_FG, width in _box_grasps(extents(shape), gripper)
+    ]
+    R = np.array([entry[0] for entry in found]).reshape(-1, 3, 3)
+    p = np.array([entry[1] for entry in found]).reshape(-1, 3)
+    return _Candidates(R, p, np.array([entry[2] for entry in found]))
 
 
 def _symmetries(shape: Shape) -> list[np.ndarray]:
@@ -107,7 +117,8 @@ def _symmetries(shape: Shape) -> list[np.ndarray]:
             return about_z
 
 
-def _box_grasps(size: np.ndarray, R_OF: np.ndarray, gripper: Gripper) -> Iterator[Grasp]:
+def _box_grasps(size: np.ndarray, gripper: Gripper) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
+    """Rotation (3,3), position (3,) and width of every grasp of a box, in its frame."""
     for axis in range(3):
         width = float(size[axis])
         if width > gripper.stroke - 2 * CLEARANCE:
@@ -125,7 +136,7 @@ def _box_grasps(size: np.ndarray, R_OF: np.ndarray, gripper: Gripper) -> Iterato
                 for sign in (1.0, -1.0):
                     y = sign * closing
                     R_FG = np.column_stack([np.cross(y, approach), y, approach])
-                    yield Grasp.at(SE3(R_OF @ R_FG, R_OF @ position), width)
+                    yield R_FG, position, width
 
 
 def _lines_through(size: np.ndarray, approach: np.ndarray, axis: int) -> Iterator[tuple[float, float, float]]:

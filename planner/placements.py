@@ -47,7 +47,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class Surface:
-    """A level rectangle to put things on: pose X_WS of its centre, half extents (2,), height of walls around (0: none)."""
+    """A level rectangle to put things on: X_WS of its centre, half extents (2,), height of the walls (0: none)."""
 
     X_WS: SE3
     half: np.ndarray
@@ -74,10 +74,7 @@ def placements(
     not looked at here.
     """
     surface = surface_of(place)
-    if surface.wall == 0.0:
-        tilts = TILTS[:1]
-    else:
-        tilts = TILTS
+    tilts = TILTS[:1] if surface.wall == 0.0 else TILTS
     for tilt in tilts:
         for _ in range(spots):
             for yaw in rng.permutation(YAWS):

@@ -46,7 +46,7 @@ class Phase:
     "slide": follow the trajectory pressed with `press`. `allowed` pairs may touch meanwhile.
 
     `held` and `opening` (m) are what the hand holds and how far it is open when the phase begins
-    ("open": the opening it ends with).
+    ("open": the opening it ends with). `grip` is the force in N with which each finger closes.
     """
 
     name: str
@@ -56,6 +56,7 @@ class Phase:
     held: Held | None = None
     allowed: frozenset[Pair] = frozenset()
     press: Press | None = None
+    grip: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,6 @@ from sim.scene import SceneState
 from skills.control.controller import ArmController
 from skills.control.reference import Mode
 
-GRIP_FORCE = 60.0
-"""Newtons with which the fingers hold an object."""
-
 CLOSING_SPEED = 0.08
 OPENING_GAIN = 12.0
 
@@ -28,6 +25,7 @@ class GripDriver:
     def __init__(self, gripper: Gripper) -> None:
         self._gripper = gripper
         self._target: float | None = gripper.stroke
+        self._force = 0.0
 
     @property
     def is_closing(self) -> bool:
@@ -38,14 +36,14 @@ class GripDriver:
         """Bring the fingers `opening` metres apart and keep them there."""
         self._target = float(np.clip(opening, 0.0, self._gripper.stroke))
 
-    def close(self) -> None:
-        """Close until an object resists, and go on pressing."""
-        self._target = None
+    def close(self, force: float) -> None:
+        """Close until an object resists, and go on pressing with `force` N each."""
+        self._target, self._force = None, force
 
     def command(self, observation: Observation) -> GripCommand:
         """The finger command for this tick."""
         if self._target is None:
-            return GripCommand(-CLOSING_SPEED, GRIP_FORCE)
+            return GripCommand(-CLOSING_SPEED, self._force)
         error = self._target - observation.opening
         limit = self._gripper.max_speed / 2
         return GripCommand(float(np.clip(OPENING_GAIN * error, -limit, limit)), self._gripper.max_force)
@@ -73,14 +71,18 @@ def _ignore(kind: str, **data: Any) -> None:
 
 @dataclass
 class SkillContext:
-    """Shared by all leaves; the executive brings `observation` and `scene` up to date before each tick of the tree."""
+    """Shared by all leaves; the executive brings `observation` and `scene` up to date before each tick of the tree.
+
+    refine: an action's motion in the present scene, and the simulated seconds that finding it costs.
+    phase, allowed: what runs now, and the contacts it declares.
+    """
 
     robot: RobotModel
     controller: ArmController
     grip: GripDriver
     observation: Observation
     scene: SceneState
-    refine: Callable[[GroundAction], Refinement | RefinementFailure]
+    refine: Callable[[GroundAction], tuple[Refinement | RefinementFailure, float]]
     contact_mode: Mode = "hybrid"
     report: Callable[..., None] = _ignore
     failure: Failure | None = None

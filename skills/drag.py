@@ -18,8 +18,8 @@ from sim.scene import Held, SceneState, half_height
 from skills.conditions import Achieved
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, Refine, Slide, Touch, sequence
-from skills.skill import Toolkit, Unfit, refine_by_sampling
-from skills.waypoints import legs, raised, shifted
+from skills.skill import MAX_PATHS, Toolkit, Unfit, refine_by_sampling
+from skills.waypoints import raised, shifted
 
 HEIGHT = 0.08
 PROBE = 0.012
@@ -174,7 +174,7 @@ class Drag:
         sliding = touching | pairs(name, surface)
         failure: MotionFailure | None = None
         waypoints = (raised(X_WG_press, HEIGHT), X_WG_press, low, X_WG_press, X_WG_end, raised(X_WG_end, HEIGHT))
-        for path in legs(self._kit, waypoints):
+        for path in motion.legs(waypoints, scene.q)[:MAX_PATHS]:
             down, probe, _, along, up = path
             moved = closed.moved(name, shifted(X_WO, X_WG_end.translation - X_WG_press.translation))
             failure = (

@@ -10,7 +10,7 @@ from py_trees.common import Status
 from py_trees.composites import Sequence
 
 from planner.failure import ContactLost, ExecutionFailure, ForceExceeded, GraspMissed, PathBlocked, RefinementFailure
-from planner.refinement import Phase
+from planner.refinement import Phase, Refinement
 from skills.context import ActionRun, SkillContext
 from skills.control.reference import Reference
 from skills.payload import load_of
@@ -28,6 +28,7 @@ STILL = 0.002
 SETTLE = 0.15
 RELEASE_TIME = 2.0
 
+
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Children one after the other; those done are not ticked again."""
     return Sequence(name, memory=True, children=list(children))
@@ -39,19 +40,33 @@ def guarded(name: str, condition: Behaviour, body: Behaviour) -> Behaviour:
 
 
 class Refine(Behaviour):
-    """Refines the action against the scene as observed, the samples known to work first."""
+    """Refines the action against the scene as observed, the samples known to work first.
+
+    Thinking takes simulated time; meanwhile the arm holds.
+    """
 
     def __init__(self, run: ActionRun, context: SkillContext) -> None:
         super().__init__("refine")
         self._run, self._context = run, context
+        self._outcome: Refinement | RefinementFailure | None = None
+        self._ready_at = 0.0
+
+    def initialise(self) -> None:
+        self._outcome = None
+        self._context.controller.hold()
 
     def update(self) -> Status:
-        outcome = self._context.refine(self._run.action)
-        if isinstance(outcome, RefinementFailure):
-            self._context.fail(outcome)
-            self.feedback_message = outcome.reason
+        now = self._context.observation.t
+        if self._outcome is None:
+            self._outcome, cost = self._context.refine(self._run.action)
+            self._ready_at = now + cost
+        if now < self._ready_at:
+            return Status.RUNNING
+        if isinstance(self._outcome, RefinementFailure):
+            self._context.fail(self._outcome)
+            self.feedback_message = self._outcome.reason
             return Status.FAILURE
-        self._run.refinement = outcome
+        self._run.refinement = self._outcome
         return Status.SUCCESS
 
 
@@ -145,7 +160,7 @@ class Close(PhaseLeaf):
 
     def begin(self) -> None:
         self._context.controller.hold()
-        self._context.grip.close()
+        self._context.grip.close(self.phase.grip)
         self._still_since: float | None = None
 
     def update(self) -> Status:

@@ -10,16 +10,26 @@ from planner.failure import MotionFailure, RefinementFailure
 from planner.grasps import Grasp, grasps, open_width, tool_grasps
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
 from planner.task.symbols import GroundAction
+from scenarios.scenario import Body
 from sim.scene import Held, SceneState
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Close, Follow, Refine, guarded, sequence
-from skills.skill import Toolkit, Unfit, refine_by_sampling
-from skills.waypoints import back_off, legs, raised
+from skills.skill import MAX_PATHS, Toolkit, Unfit, refine_by_sampling
+from skills.waypoints import back_off, raised
 
 STANDOFF = 0.08
 LIFT = 0.10
 NEAR_SPEED = 0.12
+
+GRIP_FORCE = 40.0
+"""Newtons with which each finger holds something hard."""
+
+SQUEEZE = 0.0025
+"""Metres by which the fingers may sink into something soft."""
+
+PAD_CONTACTS = 4
+"""Contact points of a pad on a flat face, each with the body's own contact stiffness."""
 
 
 class Pick:
@@ -83,7 +93,7 @@ class Pick:
         grasped = replace(scene, opening=grasp.width, held=Held(name, grasp.X_OG.inverse()))
         resting = touching | pairs(name, place)
         failure: MotionFailure | None = None
-        for path in legs(self._kit, (back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT))):
+        for path in motion.legs((back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT)), scene.q)[:MAX_PATHS]:
             into, out = path
             failure = motion.line_is_free(ready, into, touching) or motion.line_is_free(grasped, out, resting)
             if failure:
@@ -98,7 +108,14 @@ class Pick:
             return (
                 Phase("pre-grasp", "move", reach, opening),
                 Phase("approach", "approach", approach, opening, allowed=touching),
-                Phase("close", "close", still, opening, allowed=resting),
+                Phase("close", "close", still, opening, allowed=resting, grip=grip_force(scene.scenario.bodies[name])),
                 Phase("lift", "approach", lift, grasp.width, grasped.held, resting),
             )
         return failure or Unfit("the arm can't reach the grasp")
+
+
+def grip_force(body: Body) -> float:
+    """Newtons with which each finger holds a body: less where that would crush something soft."""
+    if body.contact_stiffness is None:
+        return GRIP_FORCE
+    return min(GRIP_FORCE, PAD_CONTACTS * body.contact_stiffness * SQUEEZE)

@@ -16,8 +16,8 @@ from sim.scene import SceneState
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, Refine, guarded, sequence
-from skills.skill import Toolkit, Unfit, refine_by_sampling
-from skills.waypoints import back_off, legs, raised
+from skills.skill import MAX_PATHS, Toolkit, Unfit, refine_by_sampling
+from skills.waypoints import back_off, raised
 
 STANDOFF = 0.12
 RETREAT = 0.12
@@ -92,7 +92,7 @@ class Place:
         released = replace(scene.moved(name, placement.X_WO), held=None, opening=opening)
         leaving = lowering | pairs(robot.hand_links, name)
         failure: MotionFailure | None = None
-        for path in legs(self._kit, (raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT))):
+        for path in motion.legs((raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT)), scene.q)[:MAX_PATHS]:
             into, out = path
             failure = motion.line_is_free(scene, into, lowering) or motion.line_is_free(released, out, leaving)
             if failure:

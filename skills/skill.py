@@ -20,6 +20,9 @@ from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
 from skills.control.reference import Mode
 
+MAX_PATHS = 4
+"""Joint paths (arm branches) of one sample that are tried, best first."""
+
 UNCOUNTED = 30
 """Samples that may fail before any motion is sought, for each try that counts."""
 

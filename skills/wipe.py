@@ -22,8 +22,8 @@ from sim.scene import Held, SceneState
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Refine, Slide, Touch, guarded, sequence
-from skills.skill import Toolkit, Unfit, refine_by_sampling
-from skills.waypoints import legs, raised, shifted
+from skills.skill import MAX_PATHS, Toolkit, Unfit, refine_by_sampling
+from skills.waypoints import raised, shifted
 
 HEIGHT = 0.08
 GAP = 0.02
@@ -193,7 +193,7 @@ class Wipe:
         sweeping = touching | pairs(robot.finger_links | {held.name}, crumbs) if crumbs else touching
         failure: MotionFailure | None = None
         waypoints = (X_WG_pre, X_WG_start, low, X_WG_start, X_WG_end, raised(X_WG_end, HEIGHT))
-        for path in legs(self._kit, waypoints):
+        for path in motion.legs(waypoints, scene.q)[:MAX_PATHS]:
             down, probe, _, along, up = path
             failure = (
                 motion.line_is_free(pressed, along, touching)
@@ -218,9 +218,7 @@ class Wipe:
                     sweeping,
                     press,
                 ),
-                Phase(
-                    "stroke", "slide", motion.time_line(along, contact.speed), scene.opening, held, sweeping, press
-                ),
+                Phase("stroke", "slide", motion.time_line(along, contact.speed), scene.opening, held, sweeping, press),
                 Phase("retract", "approach", motion.time_line(up, NEAR_SPEED), scene.opening, held, sweeping),
             )
         return failure or Unfit("the arm can't follow the stroke")

@@ -42,7 +42,7 @@ class ContactAudit:
             pair = frozenset((contact.first, contact.second))
             if not self.involves_robot(contact, context) or pair in allowed:
                 continue
-            if pair <= self._links or "pedestal" in pair and "link_0" in pair:
+            if pair <= self._links or ("pedestal" in pair and "link_0" in pair):
                 continue
             key = (contact.first, contact.second)
             forces[key] = forces.get(key, 0.0) + contact.normal_force

@@ -1,37 +1,38 @@
 """Wires the parts of a run together: the only place that knows them all."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-import numpy as np
+from planner.motion.motion_planner import MotionPlanner, MotionSettings
 
 from bt_tamp.executive.agenda import Agenda
 from bt_tamp.executive.belief import Belief
 from bt_tamp.executive.mission import Mission, mission, planning
-from bt_tamp.executive.plan_node import LiftOff, Planner, PlanNode
+from bt_tamp.executive.plan_node import Planner, PlanNode
 from bt_tamp.options import RunOptions
-from planner.motion.motion_planner import MotionPlanner, MotionSettings
 from planner.refinement import Work
 from planner.search_then_sample import PlanSettings, SearchThenSample
-from planner.task.facts import facts, goal_facts
+from planner.task.facts import goal_facts
+from planner.task.given import read_given
+from planner.task.pddl_reader import read_domain, read_text
 from planner.task.pyperplan_ import PyperplanPlanner
+from planner.task.symbols import Fact
 from scenarios.scenario import Scenario
 from sim.bullet import BulletPlant
 from sim.robot import RobotModel
+from sim.scene import SceneState
 from skills.catalogue import domain_path, skills
 from skills.context import GripDriver, SkillContext
 from skills.control.controller import ArmController
-from skills.skill import ContactSettings, Toolkit
+from skills.lift_off import LiftOff
+from skills.skill import ContactSettings, Skill, Toolkit
 
 CONTROL_EVERY = 2
 """Physics steps per control tick: 500 Hz."""
 
 TREE_EVERY = 10
 """Control ticks per tick of the tree: 50 Hz."""
-
-Report = Callable[..., None]
 
 
 @dataclass
@@ -47,34 +48,72 @@ class Machine:
     mission: Mission
 
 
-def build(scenario: Scenario, options: RunOptions, report: Callable[..., None], tree_changed: Callable[[str], None]) -> Machine:
+def build(
+    scenario: Scenario, options: RunOptions, report: Callable[..., None], tree_changed: Callable[[str], None]
+) -> Machine:
     """Everything that a run of `scenario` needs. `report(kind, **data)` takes events; `tree_changed(why)` is told of
     every rebuilt tree. Raises PddlError for hand-written PDDL that does not fit the scene."""
     robot = RobotModel(scenario.robot.model, scenario.robot.X_WB)
-    search, motion = build_search(scenario, options, robot, report)
     contact = contact_settings(options)
-    planner = Planner(search, options.seed)
-    motion.work = planner.thinking.work
-    goal = goal_facts(scenario.goal)
+    thinker = build_planner(scenario, options, robot, report)
+    planner, goal = thinker.planner, thinker.goal
 
     plant = BulletPlant(scenario, robot, window=options.window)
     belief = Belief(scenario, robot)
     observation = plant.observe()
-    scene = belief.update(observation, is_closing=False)
     context = SkillContext(
         robot=robot,
         controller=ArmController(robot, period=CONTROL_EVERY * plant.timestep),
         grip=GripDriver(robot.gripper),
         observation=observation,
-        scene=scene,
+        scene=belief.update(observation, is_closing=False),
         refine=lambda action: planner.refine(action, context.scene),
         contact_mode=contact.mode,
         report=report,
     )
-    agenda = Agenda(goal, search.refiners, lambda state: facts(state, search.learned), tree_changed)
-    lift = LiftOff(context, lambda q, height: motion.straight_up(q, height))
-    tree = mission(agenda, context, planning(lift, PlanNode(planner, agenda, context)))
+    agenda = Agenda(goal, thinker.skills, planner.search.facts, tree_changed)
+    tree = mission(agenda, context, planning(LiftOff(context), PlanNode(planner, agenda, context)))
     return Machine(plant, robot, belief, context, agenda, planner, tree)
+
+
+@dataclass
+class Thinker:
+    """Everything that plans, with no world attached."""
+
+    planner: Planner
+    skills: Mapping[str, Skill]
+    goal: frozenset[Fact]
+
+
+def build_planner(scenario: Scenario, options: RunOptions, robot: RobotModel, report: Callable[..., None]) -> Thinker:
+    """What plans for `scenario`. Raises PddlError for hand-written PDDL that does not fit, ValueError for options."""
+    work = Work()
+    motion = MotionPlanner(robot, options.seed, motion_settings(options), work)
+    primitives = skills(Toolkit(robot, motion, contact_settings(options)))
+    task_planner = PyperplanPlanner(options.search or ("astar-hmax" if options.preset == "paper" else "auto"))
+    settings = PlanSettings() if options.tries is None else PlanSettings(tries=options.tries)
+
+    def tell(kind: str, data: Mapping[str, Any]) -> None:
+        report(kind, **data)
+
+    if options.domain is None or options.problem is None:
+        domain, given, goal = read_domain(read_text(domain_path())), None, goal_facts(scenario.goal)
+    else:
+        start = SceneState.initial(scenario, robot.gripper.stroke)
+        arities = {name: skill.arity for name, skill in primitives.items()}
+        domain, given = read_given(options.domain, options.problem, arities, start)
+        goal = given.problem.goal
+    search = SearchThenSample(task_planner, primitives, domain, settings, tell, given)
+    return Thinker(Planner(search, options.seed, work), primitives, goal)
+
+
+def motion_settings(options: RunOptions) -> MotionSettings:
+    """Which motion planner, by options and preset. "paper": RRT with goal bias 0.05, the best of five."""
+    if options.motion_planner is not None:
+        return MotionSettings(planner=options.motion_planner)
+    if options.preset == "paper":
+        return MotionSettings(planner="best-of-n-RRT", goal_bias=0.05, restarts=5)
+    return MotionSettings()
 
 
 def contact_settings(options: RunOptions) -> ContactSettings:

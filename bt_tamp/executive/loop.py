@@ -50,8 +50,11 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
     tally = Tally()
     clock = [0.0]
 
+    machine: Machine | None = None
+
     def report(kind: str, **data: object) -> None:
-        _report(recorder, clock[0], kind, data)
+        earlier_rounds = machine.planner.thinking.rounds if machine else 0
+        _report(recorder, clock[0], kind, data, earlier_rounds)
 
     machine = build(scenario, options, report, lambda why: recorder.tree(machine.mission.root, why))
     audit = ContactAudit(machine.robot, scenario)
@@ -162,9 +165,9 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audit: Contact
     )
 
 
-def _report(recorder: RunRecorder, t: float, kind: str, data: dict) -> None:
+def _report(recorder: RunRecorder, t: float, kind: str, data: dict, earlier_rounds: int) -> None:
     if kind == "round":
-        number = data["number"]
-        recorder.pddl(number, data.pop("domain"), data.pop("problem"))
-        recorder.plan(number, "\n".join(data["plan"]) if data["plan"] else "no plan")
+        data["round"] += earlier_rounds
+        recorder.pddl(data["round"], data.pop("domain"), data.pop("problem"))
+        recorder.plan(data["round"], "\n".join(data["plan"]) if data["plan"] else "no plan")
     recorder.event(kind, t, **data)

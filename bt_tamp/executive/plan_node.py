@@ -1,8 +1,7 @@
 """The planner node: feeds back what failed, plans from what is observed now, and rebuilds `act`."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from py_trees.behaviour import Behaviour
@@ -10,31 +9,26 @@ from py_trees.common import Status
 
 from bt_tamp.executive.agenda import Agenda
 from planner.failure import ExecutionFailure, RefinementFailure
-from planner.motion.trajectory import Trajectory
 from planner.refinement import Refinement, Work
 from planner.search_then_sample import NoPlan, SearchThenSample, Solution
 from planner.task.symbols import GroundAction
 from sim.scene import SceneState
 from skills.context import SkillContext
-from skills.control.reference import Reference
 
 COST = {"checks": 5e-6, "exact_checks": 2e-5, "ik": 1e-4, "expansions": 1e-4}
 """Simulated seconds that one unit of planning work costs: the world does not stop while the robot thinks."""
-
-LIFT_HEIGHT = 0.05
-LIFT_TIME = 1.0
 
 
 @dataclass
 class Thinking:
     """What planning has cost so far: CPU and wall seconds, rounds, replans."""
 
+    work: Work
     cpu_s: float = 0.0
     wall_s: float = 0.0
     rounds: int = 0
     plans: int = 0
     verdict: NoPlan | None = None
-    work: Work = field(default_factory=Work)
     _started: tuple[float, float] = (0.0, 0.0)
 
     def __enter__(self) -> "Thinking":
@@ -54,9 +48,9 @@ class Thinking:
 class Planner:
     """Search-then-sample with its random stream and its costs: what the planner node and `refine` share."""
 
-    def __init__(self, search: SearchThenSample, seed: int) -> None:
+    def __init__(self, search: SearchThenSample, seed: int, work: Work) -> None:
         self.search = search
-        self.thinking = Thinking()
+        self.thinking = Thinking(work)
         self._rng = np.random.default_rng([seed, 7])
 
     def plan(self, scene: SceneState, agenda: Agenda) -> Solution | NoPlan:
@@ -67,10 +61,12 @@ class Planner:
         thinking.plans += 1
         return outcome
 
-    def refine(self, action: GroundAction, scene: SceneState) -> Refinement | RefinementFailure:
-        """One action refined again in the scene as it is believed now."""
+    def refine(self, action: GroundAction, scene: SceneState) -> tuple[Refinement | RefinementFailure, float]:
+        """One action refined again in the scene as it is believed now, and the simulated seconds it costs."""
         with self.thinking as thinking:
-            return self.search.refine(action, scene, self._rng, thinking.work)
+            before = thinking.simulated_cost()
+            outcome = self.search.refine(action, scene, self._rng, thinking.work)
+            return outcome, thinking.simulated_cost() - before
 
 
 class PlanNode(Behaviour):
@@ -118,33 +114,10 @@ class PlanNode(Behaviour):
         failure = context.failure
         reason = self._agenda.review(context)
         if failure is not None:
-            context.report("action_failed", action=str(failure.action), kind_=failure.kind, reason=failure.reason)
+            context.report("action_failed", action=str(failure.action), failure=failure.kind, reason=failure.reason)
             if isinstance(failure, (ExecutionFailure, RefinementFailure)):
                 self._planner.search.learn(failure, context.scene)
         if self._planner.thinking.plans:
             context.report("replan", reason=reason)
         self._agenda.drop()
         context.failure = None
-
-
-class LiftOff(Behaviour):
-    """Takes the arm out of contact, straight up, before it stands and thinks."""
-
-    def __init__(self, context: SkillContext, raise_arm: Callable[[np.ndarray, float], Trajectory]) -> None:
-        super().__init__("lift off")
-        self._context, self._raise_arm = context, raise_arm
-        self._lifting = False
-
-    def initialise(self) -> None:
-        context = self._context
-        self._lifting = context.controller.contact
-        if self._lifting:
-            trajectory = self._raise_arm(context.observation.q, LIFT_HEIGHT)
-            context.controller.follow(Reference(trajectory, "position"))
-        else:
-            context.controller.hold()
-
-    def update(self) -> Status:
-        if self._lifting and not self._context.controller.finished:
-            return Status.RUNNING
-        return Status.SUCCESS
