@@ -4,6 +4,7 @@ It shares no arithmetic with the fast model. Bounding boxes, in numpy, sort out 
 coal measures the rest.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -45,6 +46,10 @@ class _Solid:
     X: SE3
     half: np.ndarray
     geometry: Any
+
+
+_Posed = tuple[_Solid, Any]
+"""A solid with its coal transform in W."""
 
 
 class _Fixed:
@@ -109,11 +114,11 @@ class ExactChecker:
 
     def is_free(self, q: np.ndarray) -> bool:
         """Is q (7,) within the joint limits and free of collision?"""
-        return self._within_limits(q) and not self.contacts(q[None])
+        return self._within_limits(q) and not self._contacts(q[None], True)
 
     def edge_is_free(self, qa: np.ndarray, qb: np.ndarray) -> bool:
         """Is the straight edge from qa to qb free, at JOINT_STEP and TRAVEL_STEP?"""
-        return self._within_limits(qb) and not self.contacts(self.densified(np.stack([qa, qb])))
+        return self._within_limits(qb) and not self._contacts(self.densified(np.stack([qa, qb])), True)
 
     def colliding_pairs(self, q: np.ndarray) -> frozenset[Pair]:
         """Names of the robot's parts (or the held body) and what they hit at q (7,), or hit among each other."""
@@ -124,16 +129,8 @@ class ExactChecker:
 
         Sorted by index, then by names.
         """
-        self.checks += len(q)
-        placed = self._moving.placed(q)
-        found: dict[Pair, Contact] = {}
-        lower, upper = self._fixed.lower[None], self._fixed.upper[None]
-        for index, a, b, margin in _near(placed, lower, upper, self._outward):
-            second = (self._fixed.solids[b], self._fixed.transforms[b])
-            self._note(found, index, margin, self._at(placed, index, a), second)
-        for index, a, b, margin in _near(placed, placed.lower, placed.upper, self._inward):
-            self._note(found, index, margin, self._at(placed, index, a), self._at(placed, index, b))
-        return sorted(found.values(), key=lambda contact: (contact.index, sorted(contact.pair)))
+        found = self._contacts(q, False)
+        return sorted(found, key=lambda contact: (contact.index, sorted(contact.pair)))
 
     def densified(self, path: np.ndarray) -> np.ndarray:
         """The path (n,7) with configurations (k,7) put in between, as close as JOINT_STEP and TRAVEL_STEP demand."""
@@ -155,29 +152,37 @@ class ExactChecker:
     def _within_limits(self, q: np.ndarray) -> bool:
         return bool(np.all(q >= self._limits[0]) and np.all(q <= self._limits[1]))
 
-    def _at(self, placed: _Placed, index: int, k: int) -> tuple[_Solid, Any]:
+    def _contacts(self, q: np.ndarray, first_only: bool) -> list[Contact]:
+        self.checks += len(q)
+        placed = self._moving.placed(q)
+        found: dict[Pair, Contact] = {}
+        for index, margin, first, second in self._candidates(placed):
+            pair = frozenset((first[0].name, second[0].name))
+            known = found.get(pair)
+            if known is not None and known.index < index:
+                continue
+            distance = self._distance(first, second)
+            if distance < margin and (known is None or distance < known.distance):
+                found[pair] = Contact(index, pair, distance)
+                if first_only:
+                    break
+        return list(found.values())
+
+    def _candidates(self, placed: _Placed) -> Iterator[tuple[int, float, _Posed, _Posed]]:
+        """What is near by world bounds: index, margin, and the two solids where they are."""
+        for index, a, b, margin in _near(placed, self._fixed.lower[None], self._fixed.upper[None], self._outward):
+            yield index, margin, self._at(placed, index, a), (self._fixed.solids[b], self._fixed.transforms[b])
+        for index, a, b, margin in _near(placed, placed.lower, placed.upper, self._inward):
+            yield index, margin, self._at(placed, index, a), self._at(placed, index, b)
+
+    def _at(self, placed: _Placed, index: int, k: int) -> _Posed:
         rider = k - self._moving.arm
         R = np.eye(3) if rider < 0 else placed.R[index, rider]
         return self._moving.solids[k], coal.Transform3s(R, placed.p[index, k])
 
-    def _note(
-        self,
-        found: dict[Pair, Contact],
-        index: int,
-        margin: float,
-        first: tuple[_Solid, Any],
-        second: tuple[_Solid, Any],
-    ) -> None:
-        pair = frozenset((first[0].name, second[0].name))
-        known = found.get(pair)
-        if known is not None and known.index < index:
-            return
+    def _distance(self, first: _Posed, second: _Posed) -> float:
         self._result.clear()
-        distance = coal.distance(
-            first[0].geometry, first[1], second[0].geometry, second[1], self._request, self._result
-        )
-        if distance < margin and (known is None or distance < known.distance):
-            found[pair] = Contact(index, pair, distance)
+        return coal.distance(first[0].geometry, first[1], second[0].geometry, second[1], self._request, self._result)
 
 
 @dataclass(frozen=True)

@@ -110,8 +110,9 @@ def _solve(R, p, swivel, lengths, a):
     upper, fore = lengths[1], lengths[2]
     reach = np.sqrt(wx * wx + wy * wy + wz * wz)
     cosine = (reach * reach - upper * upper - fore * fore) / (2 * upper * fore)
-    if reach < 1e-9 or abs(cosine) > 1.0:
+    if reach < 1e-9 or abs(cosine) > 1.0 + 1e-9:
         return False
+    cosine = min(1.0, max(-1.0, cosine))
     sine = np.sqrt(1.0 - cosine * cosine)
     wx, wy, wz = wx / reach, wy / reach, wz / reach
     # Height of the elbow's circle along the line to the wrist, and its radius, as parts of the upper arm.

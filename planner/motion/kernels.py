@@ -3,9 +3,10 @@
 Solids are boxes, cylinders and spheres with half extents about their centre. A sphere against
 anything is exact. Two solids that aren't spheres are held apart by a separating axis: among the
 axes tried, one along which both are further apart than the margin. For two boxes these are the
-classic fifteen (Gottschalk, Lin, Manocha: OBBTree, 1996), exact at margin zero; with a margin, or with a
-cylinder, a pair may be rejected that is apart by slightly more (two corners, or a rim facing a
-corner): never the other way round.
+classic fifteen (Gottschalk, Lin, Manocha: OBBTree, 1996), exact at margin zero; with a margin, two corners
+facing each other may be rejected that are apart by a little more. A cylinder against a box or a
+cylinder may be rejected half a millimetre too early on average, rarely a centimetre, where its rim faces an
+edge. Never is a pair accepted that is nearer than its margin.
 
 Everything travels in few, flat tables, because a compiled call pays for every array it is handed.
 Placements are 12 numbers: the rotation row by row, then the origin.

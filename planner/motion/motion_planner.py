@@ -30,7 +30,7 @@ SLACK = 0.0005
 DEEPEST = -0.004
 """Distance in metres (negative: overlap) at which the arm may still start: things held or pressed give way a little."""
 
-_KNOT_SPACINGS = (0.25, 0.08)
+_CONTROL_SPACINGS = (0.3, 0.1)
 _ATTEMPTS = 3
 _RECENT = 12
 
@@ -226,7 +226,7 @@ class MotionPlanner:
 
     def _timed(self, scene: SceneState, path: np.ndarray, margins: Margins) -> Trajectory | None:
         margins = replace(margins, free=self.settings.audit_margin)
-        timings = [lambda spacing=spacing: time_path(self.robot, path, spacing) for spacing in _KNOT_SPACINGS]
+        timings = [lambda spacing=spacing: time_path(self.robot, path, spacing) for spacing in _CONTROL_SPACINGS]
         for timing in (*timings, lambda: time_path_with_stops(self.robot, path)):
             trajectory = timing()
             if self._audit(scene, trajectory.q, margins) is None:

@@ -84,15 +84,15 @@ class _Edges(base.MotionValidator):
     """Asks the checker about configurations and whole edges, and ends the search when its budget is spent."""
 
     def __init__(
-        self, information: base.SpaceInformation, checker: CollisionChecker, end: base.PlannerTerminationCondition
+        self,
+        information: base.SpaceInformation,
+        checker: CollisionChecker,
+        max_checks: int,
+        end: base.PlannerTerminationCondition,
     ) -> None:
         super().__init__(information)
         self._checker, self._end = checker, end
-        self._last = checker.checks
-
-    def allow(self, checks: int) -> None:
-        """Grant so many checks from now on."""
-        self._last = self._checker.checks + checks
+        self._last = checker.checks + max_checks
 
     def is_free(self, state: Any) -> bool:
         """May the arm be there?"""
@@ -117,7 +117,7 @@ def _search(
     space.setBounds(_bounds(query.limits))
     information = base.SpaceInformation(space)
     end = base.plannerNonTerminatingCondition()
-    edges = _Edges(information, checker, end)
+    edges = _Edges(information, checker, max_checks, end)
     information.setStateValidityChecker(edges.is_free)
     information.setMotionValidator(edges)
     information.setup()
@@ -134,12 +134,13 @@ def _search(
         planner.setGoalBias(settings.goal_bias)
     planner.setProblemDefinition(problem)
     planner.setup()
-    edges.allow(max_checks)
     planner.solve(end)
     if not problem.hasExactSolution():
         return None
     solution: Any = problem.getSolutionPath()
-    return np.array([state[0:7] for state in solution.getStates()])
+    path = np.array([state[0:7] for state in solution.getStates()])
+    # AORRTC may hand its path over from the goal's end.
+    return path if np.array_equal(path[0], query.start) else path[::-1]
 
 
 def _bounds(limits: np.ndarray) -> base.RealVectorBounds:

@@ -4,15 +4,15 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import BSpline, CubicSpline
 
 from planner.motion.chain import tcp_path
 from planner.motion.topp import fastest_rates
 from planner.motion.trajectory import Trajectory
 from sim.robot import RobotModel
 
-KNOT_SPACING = 0.25
-"""Largest distance in rad between knots of the spline that rounds a polyline's corners."""
+CONTROL_SPACING = 0.3
+"""Largest distance in rad between the control points of the curve that rounds a polyline's corners."""
 
 SPEED = 0.9
 """Part of the joints' velocity and acceleration limits that is used."""
@@ -20,7 +20,7 @@ SPEED = 0.9
 TCP_ACCELERATION = 0.5
 """Default acceleration of the hand along lines, m/s²."""
 
-_SAMPLE = 0.015
+_SAMPLE = 0.02
 _GRID_STEP = 0.05
 _GRID_SIZE = (20, 80)
 _RADIUS = 0.25
@@ -31,28 +31,29 @@ _PEAK = 1.875
 """Peak of the derivative of the smooth step 10u³ − 15u⁴ + 6u⁵."""
 
 
-def time_path(robot: RobotModel, waypoints: np.ndarray, spacing: float = KNOT_SPACING) -> Trajectory:
-    """The fastest motion along a spline through the polyline (n,7), from rest to rest, at SPEED of the limits.
+def time_path(robot: RobotModel, waypoints: np.ndarray, spacing: float = CONTROL_SPACING) -> Trajectory:
+    """The fastest motion along a smooth curve close to the polyline (n,7), from rest to rest, at SPEED of the limits.
 
-    The spline passes through knots at most `spacing` rad apart on the polyline and leaves it a little
-    near corners, the less the closer the knots.
+    The curve is a cubic B-spline with its control points on the polyline, at most `spacing` rad apart: it
+    stays on straight stretches and cuts corners on the inside, by less than a third of the spacing.
     """
-    knots = _densified(waypoints, spacing)
-    if len(knots) < 2:
+    curve, length = _rounded(waypoints, spacing)
+    if length == 0.0:
         return Trajectory.standstill(waypoints[0])
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))])
-    spline = CubicSpline(way, knots, bc_type="natural")
-    grid = np.linspace(0.0, way[-1], int(np.clip(way[-1] / _GRID_STEP, *_GRID_SIZE)) + 1)
-    rate = fastest_rates(grid, spline(grid, 1), spline(grid, 2), SPEED * robot.v_max, SPEED * robot.a_max)
+    end = float(curve.t[-1])
+    grid = np.linspace(0.0, end, int(np.clip(length / _GRID_STEP, *_GRID_SIZE)) + 1)
+    rate = fastest_rates(grid, curve(grid, 1), curve(grid, 2), SPEED * robot.v_max, SPEED * robot.a_max)
+    # The path's acceleration is constant between grid points and jumps there, so each gets a knot.
     durations = 2 * np.diff(grid) / (rate[1:] + rate[:-1])
-    marks = np.concatenate([[0.0], np.cumsum(durations)])
-    times = np.linspace(0.0, marks[-1], max(5, int(np.ceil(marks[-1] / _SAMPLE)) + 1))
-    k = np.clip(np.searchsorted(marks, times, side="right") - 1, 0, len(durations) - 1)
-    since, gain = times - marks[k], (np.diff(rate) / durations)[k]
-    s = np.minimum(grid[k] + since * (rate[k] + gain * since / 2), way[-1])
-    v = spline(s, 1) * (rate[k] + gain * since)[:, None]
-    v[0] = v[-1] = 0.0
-    return slowed(Trajectory(times, spline(s), v), robot)
+    pieces = np.ceil(durations / _SAMPLE).astype(int)
+    k = np.repeat(np.arange(len(pieces)), pieces)
+    part = (np.arange(len(k)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[k]
+    since = part * durations[k]
+    gain = (np.diff(rate) / durations)[k]
+    s = np.append(grid[k] + since * (rate[k] + gain * since / 2), end)
+    v = curve(s, 1) * np.append(rate[k] + gain * since, 0.0)[:, None]
+    times = np.append((np.cumsum(durations) - durations)[k] + since, durations.sum())
+    return slowed(Trajectory(times, curve(s), v), robot)
 
 
 def time_path_with_stops(robot: RobotModel, waypoints: np.ndarray) -> Trajectory:
@@ -114,14 +115,19 @@ def _peaks(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     return velocity, np.maximum(np.abs(a0), np.abs(a1)).max(axis=0)
 
 
-def _densified(waypoints: np.ndarray, spacing: float) -> np.ndarray:
-    knots = [waypoints[0]]
+def _rounded(waypoints: np.ndarray, spacing: float) -> tuple[BSpline, float]:
+    """Clamped cubic B-spline with control points along the polyline (n,7), and the polyline's length in rad."""
+    points, length = [waypoints[0]], 0.0
     for start, end in pairwise(waypoints):
-        length = float(np.linalg.norm(end - start))
-        if length > 1e-6:
-            count = int(np.ceil(length / spacing))
-            knots += [start + (end - start) * k / count for k in range(1, count + 1)]
-    return np.array(knots)
+        edge = float(np.linalg.norm(end - start))
+        if edge > 1e-6:
+            # Three edges at least on every stretch, for a curve that is cubic all along.
+            count = max(3, int(np.ceil(edge / spacing)))
+            points += [start + (end - start) * k / count for k in range(1, count + 1)]
+            length += edge
+    inner = max(len(points) - 3, 1)
+    knots = np.concatenate([np.zeros(3), np.arange(inner + 1), np.full(3, inner)]).astype(float)
+    return BSpline(knots, np.array(points if length else points * 4), 3), length
 
 
 def _twists(R: np.ndarray, p: np.ndarray) -> np.ndarray:
