@@ -66,16 +66,21 @@ class Case:
         return minimal(kept.needs for kept in self.samples.values() if kept.needs)
 
     def forget(self, is_gone: Callable[[Spot], bool]) -> None:
-        """Drop the samples that speak of such spots.
+        """Take such spots out of what the samples need.
 
-        With a set dropped, what is left is no longer all there is, and the case no longer failed;
-        neither is it when no set is left at all.
+        A sample that needs nothing any more is worth another try, and the case no longer failed;
+        one that needs more than what is gone is still blocked by the rest.
         """
-        lost = [sample for sample, kept in self.samples.items() if kept.needs and any(map(is_gone, kept.needs))]
-        stale = [sample for sample, kept in self.samples.items() if any(map(is_gone, kept.context))]
-        for sample in {*lost, *stale}:
-            del self.samples[sample]
-        if lost or (stale and not self.minimal()):
+        reopened = False
+        for sample, kept in list(self.samples.items()):
+            rest = kept.needs and frozenset(spot for spot in kept.needs if not is_gone(spot))
+            is_stale = any(map(is_gone, kept.context))
+            if is_stale or (kept.needs and not rest):
+                del self.samples[sample]
+                reopened = reopened or not is_stale or not self.minimal()
+            elif rest != kept.needs:
+                self.samples[sample] = replace(kept, needs=rest)
+        if reopened:
             self.has_failed, self.failures = False, 0
 
 

@@ -169,6 +169,16 @@ def test_with_one_sample_void_the_action_is_open_again_but_the_others_stay_known
     assert learned.hints(PICK, Situation.now(moved))[0].avoid == {1}
 
 
+def test_a_sample_blocked_by_two_is_still_blocked_by_one_when_the_other_is_gone(learned, scene):
+    learned.learn(failed(PICK, {"mug", "jug"}), Situation.now(scene), (), 20)
+    moved = displaced(scene, "mug")
+    learned.observe(moved)
+    assert learned.constraints() == {PICK: {spots("jug"), OWN}}
+    assert "jug" in learned.in_the_way(moved)
+    learned.observe(displaced(moved, "jug"))
+    assert learned.constraints() == {}
+
+
 def test_a_body_taken_up_is_displaced(learned, scene):
     learned.learn(failed(PICK, {"mug"}), Situation.now(scene), (), 20)
     assert learned.observe(replace(scene, held=Held("mug", SE3.Identity()))) == {"mug"}
