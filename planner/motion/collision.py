@@ -144,25 +144,32 @@ def _solid_row(shape: Shape, X: SE3, part: int) -> np.ndarray:
     return np.concatenate([[_kind(shape), part, bounding_radius(shape)], extents(shape) / 2, _placement(X)])
 
 
+@lru_cache(maxsize=64)
+def _hand_rows(robot: RobotModel, opening: float) -> np.ndarray:
+    """Hand and fingers as a table (m, SOLID_COLUMNS) in link 7."""
+    poses = robot.link_poses(np.zeros(7), opening)
+    X_7W = poses["link_7"].inverse()
+    return np.array(
+        [
+            _solid_row(solid.shape, X_7W * poses[solid.link] * solid.X_LS, robot.links.index(solid.link))
+            for solid in robot.geometry
+            if solid.link in robot.hand_links
+        ]
+    )
+
+
 def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | None) -> ArmArrays:
     chain = _chain(robot)
-    neutral = np.zeros(7)
-    poses = robot.link_poses(neutral, opening)
-    X_7W = poses["link_7"].inverse()
-    X_7G = X_7W * robot.X_WG(neutral)
-    solids = [
-        _solid_row(solid.shape, X_7W * poses[solid.link] * solid.X_LS, robot.links.index(solid.link))
-        for solid in robot.geometry
-        if solid.link in robot.hand_links
-    ]
-    probes = [X_7G.translation]
+    X_7G = robot.model.frames[robot.tcp_id].placement
+    solids = _hand_rows(robot, opening)
+    probes = X_7G.translation[None]
     if held is not None:
         grip, shape = held
         X_7O = X_7G * grip.X_GO
-        solids.append(_solid_row(shape, X_7O, len(robot.links)))
-        probes += [X_7O.act(corner) for corner in _CORNERS * extents(shape) / 2]
-    limits = np.stack([robot.q_min, robot.q_max])
-    return ArmArrays(*chain[:2], limits, *chain[2:], np.array(solids), np.array(probes))
+        solids = np.concatenate([solids, _solid_row(shape, X_7O, len(robot.links))[None]])
+        corners = _CORNERS * (extents(shape) / 2) @ X_7O.rotation.T + X_7O.translation
+        probes = np.concatenate([probes, corners])
+    return ArmArrays(*chain[:2], np.stack([robot.q_min, robot.q_max]), *chain[2:], solids, probes)
 
 
 @lru_cache(maxsize=64)

@@ -247,21 +247,23 @@ def _arm_solids(robot: RobotModel) -> list[_Solid]:
     return [_solid(s.link, links.index(s.link), s.X_LS, s.shape) for s in robot.geometry if s.link in links]
 
 
+@lru_cache(maxsize=64)
+def _hand_solids(robot: RobotModel, opening: float) -> list[_Solid]:
+    last = ARM_LINKS - 1
+    poses = robot.link_poses(np.zeros(7), opening)
+    X_7W = poses[robot.links[last]].inverse()
+    hand = [solid for solid in robot.geometry if solid.link in robot.hand_links]
+    return [_solid(solid.link, last, X_7W * poses[solid.link] * solid.X_LS, solid.shape) for solid in hand]
+
+
 def _riders(robot: RobotModel, scene: SceneState) -> list[_Solid]:
     """Hand, fingers and held body, in link 7."""
-    last = ARM_LINKS - 1
-    neutral = np.zeros(7)
-    poses = robot.link_poses(neutral, scene.opening)
-    X_7W = poses[robot.links[last]].inverse()
-    solids = [
-        _solid(s.link, last, X_7W * poses[s.link] * s.X_LS, s.shape)
-        for s in robot.geometry
-        if s.link in robot.hand_links
-    ]
-    if scene.held is not None:
-        shape = scene.scenario.bodies[scene.held.name].shape
-        solids.append(_solid(scene.held.name, last, X_7W * robot.X_WG(neutral) * scene.held.X_GO, shape))
-    return solids
+    solids = _hand_solids(robot, scene.opening)
+    if scene.held is None:
+        return solids
+    X_7O = robot.model.frames[robot.tcp_id].placement * scene.held.X_GO
+    shape = scene.scenario.bodies[scene.held.name].shape
+    return [*solids, _solid(scene.held.name, ARM_LINKS - 1, X_7O, shape)]
 
 
 def _solid(name: str, link: int, X: SE3, shape: Shape) -> _Solid:

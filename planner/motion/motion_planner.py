@@ -52,7 +52,8 @@ class MotionSettings:
 class MotionPlanner:
     """Plans motions of one robot. Every random choice follows from `seed` and the number of the query.
 
-    Counts "checks" (configurations tested for collision) and "ik" (poses solved) in `work`.
+    Counts in `work` configurations tested for collision, "checks" by the fast model and "exact_checks", and poses
+    solved, "ik".
     """
 
     def __init__(
@@ -74,7 +75,7 @@ class MotionPlanner:
         """Is q (7,) within the limits, and everything but the allowed pairs at least `margin` metres apart?"""
         margins = Margins(self.settings.margin if margin is None else margin, allowed)
         checker = self._exact(scene, margins)
-        self.work.add("checks")
+        self.work.add("exact_checks")
         return checker.is_free(q)
 
     def hand_hits(
@@ -197,7 +198,7 @@ class MotionPlanner:
             path = plan_path(query, checker, self._path_settings)
             if path is not None:
                 path = shortened(path, checker, np.random.default_rng(seed))
-        self.work.add("checks", checker.checks)
+        self.work.add("checks" if isinstance(checker, FastChecker) else "exact_checks", checker.checks)
         return path
 
     def _checker(
@@ -242,7 +243,7 @@ class MotionPlanner:
     def _contacts(self, scene: SceneState, path: np.ndarray, margins: Margins) -> list[Contact]:
         checker = self._exact(scene, margins)
         dense = checker.densified(path)
-        self.work.add("checks", len(dense))
+        self.work.add("exact_checks", len(dense))
         return checker.contacts(dense)
 
     def _exact(self, scene: SceneState, margins: Margins) -> ExactChecker:

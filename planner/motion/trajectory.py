@@ -38,6 +38,10 @@ class Trajectory:
             return Trajectory(np.zeros(1), q[None], np.zeros((1, 7)))
         return Trajectory(np.array([0.0, duration]), np.stack([q, q]), np.zeros((2, 7)))
 
+    def slowed(self, factor: float) -> "Trajectory":
+        """The same path, taking `factor` times as long."""
+        return Trajectory(self.times * factor, self.q, self.v / factor)
+
     @property
     def duration(self) -> float:
         """Seconds from the first knot to the last."""
