@@ -222,11 +222,6 @@ class Learned:
 
     def forget_predicted(self) -> None:
         """Drop what was learned of poses that only a plan would have brought about."""
-        for case in self._cases.values():
-            for sample, kept in case.samples.items():
-                seen = kept.needs and frozenset(spot for spot in kept.needs if spot.left_by is None)
-                if seen:
-                    case.samples[sample] = replace(kept, needs=seen)
         self._drop(lambda spot: spot.left_by is not None)
 
     def retract(self, tries: int) -> None:

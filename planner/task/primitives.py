@@ -42,8 +42,8 @@ def ground(schema: ActionSchema, args: tuple[str, ...]) -> Step:
     """The step that a schema becomes with all its parameters bound to `args`."""
     binding = {parameter.name: arg for parameter, arg in zip(schema.parameters, args, strict=True)}
     action = GroundAction(primitive(schema.name), args[: len(own_parameters(schema))])
-    adds = bound(schema.adds, binding)
-    return Step(action, bound(schema.preconditions, binding), adds, bound(schema.deletes, binding) - adds)
+    literals = (bound(part, binding) for part in (schema.preconditions, schema.adds, schema.deletes))
+    return Step(action, *literals)
 
 
 def arities(domain: Domain) -> dict[str, int]:
@@ -58,17 +58,19 @@ def arities(domain: Domain) -> dict[str, int]:
 
 
 def grasping(domain: Domain) -> frozenset[str]:
-    """Primitives that need `graspable` of the body they move."""
-    return frozenset(
-        primitive(schema.name)
-        for schema in domain.actions
-        if Fact(GRASPABLE, (schema.parameters[0].name,)) in schema.preconditions
-    )
+    """Primitives that need `graspable` of the body they move, in each of their schemas."""
+    needing = {schema.name for schema in domain.actions if _graspable(schema) in schema.preconditions}
+    others = {primitive(schema.name) for schema in domain.actions if schema.name not in needing}
+    return frozenset(map(primitive, needing)) - others
+
+
+def _graspable(schema: ActionSchema) -> Fact:
+    return Fact(GRASPABLE, (schema.parameters[0].name,))
 
 
 def achievers_of_grasps(domain: Domain) -> tuple[str, ...]:
     """Primitives that make a body graspable, in alphabetical order."""
-    names = {primitive(schema.name) for schema in domain.actions if any(f.predicate == GRASPABLE for f in schema.adds)}
+    names = {primitive(schema.name) for schema in domain.actions if _graspable(schema) in schema.adds}
     return tuple(sorted(names))
 
 

@@ -95,6 +95,7 @@ def test_fig1_wipe_begins_with_the_naive_four_actions_and_learns_what_obstructs_
         [WIPE_CARROT, WIPE_TOMATO],
         "place(sponge, left_bin)",
     )
+    assert not run.of("backtracked"), "what was seen in the way is no matter of how the sponge is held"
     assert set(run.learned) >= {f"box obstructs {WIPE_CARROT}", f"book and box obstruct {WIPE_TOMATO}"}
     assert reached(solution, scene.scenario.goal)
 
@@ -179,7 +180,7 @@ def test_a_sample_that_fails_again_with_its_culprit_away_gets_a_larger_set_of_it
     needs = frozenset({Spot("mug"), Spot("jug")})
     assert run.loop.learned.constraints()[PICK_CUP] == {needs, frozenset({Spot("cup")})}
     tried = [samples for action, samples, _ in skill.calls if action == "pick(cup, table)"]
-    assert tried[1][:5] == [0, 1, 2, 3, 4], "what was blocked by something now away comes first"
+    assert tried[1] == [*range(10)], "what was blocked by something now away comes first, then as many new ones"
     avoided = [avoid for action, _, avoid in skill.calls if action == "pick(cup, table)"]
     assert avoided[0] == frozenset()
     assert 0 in avoided[-1], "what fails whatever is away isn't tried again"
@@ -210,33 +211,91 @@ def test_a_culprit_that_the_plan_itself_put_there_is_first_put_elsewhere(tableto
     assert len(run.rounds) == 2
 
 
+def test_going_back_farther_opens_the_later_choices_again(tabletop, stand_in, is_at_start):
+    def only(*samples):
+        return lambda sample, scene: None if sample in samples else set()
+
+    def pick_cup(sample, scene):
+        found = {name for name in ("mug", "jug") if is_at_start(scene, name)}
+        x = {name: round(float(scene.poses[name].translation[0]), 2) for name in ("mug", "jug")}
+        return found or (None if (x["mug"], x["jug"]) in ((0.07, 0.05), (0.05, 0.07)) else {"mug", "jug"})
+
+    def put(action, sample, scene):
+        if action.name == "pick" and action.args[0] == "cup":
+            return pick_cup(sample, scene)
+        first = next((name for name in ("jug", "mug") if not is_at_start(scene, name)), action.args[0])
+        if action.name == "place" and action.args[0] in ("mug", "jug"):
+            return only(0, 1)(sample, scene) if action.args[0] == first else only(0)(sample, scene)
+        return None
+
+    run = Run(stand_in(put))
+    goal = f"(and {CUP_AWAY} (in_bin mug table) (in_bin jug table))"
+    solution = run.plan(tabletop("cup mug jug", bins=("right_bin",)), goal)
+    assert isinstance(solution, Solution)
+    assert len(run.of("backtracked")) >= 2
+
+
+def test_a_grasp_that_the_rest_can_not_use_is_exchanged(tabletop, stand_in):
+    def wipe_crumb(sample, scene):
+        return set() if scene.held.X_GO.translation[2] < 0.0015 else None
+
+    run = Run(stand_in(rule(wipe_crumb=wipe_crumb)))
+    solution = run.plan(tabletop("", "crumb"), "(in_bin crumb dustpan)")
+    assert [event["to"] for event in run.of("backtracked")] == ["pick(sponge, dustpan)"] * 2
+    assert solution.refinements[0].sample == 2
+    assert len(run.rounds) == 1
+
+
+class Stubborn:
+    """A task planner that gives the same plan whatever was learned."""
+
+    def __init__(self):
+        self.plan = None
+
+    def solve(self, domain_text, problem_text, max_expansions):
+        self.plan = self.plan or PyperplanPlanner().solve(domain_text, problem_text, max_expansions)
+        return self.plan
+
+
+def test_a_failing_plan_is_not_repeated_without_end(tabletop, stand_in):
+    skill = stand_in(rule(pick_cup=lambda sample, scene: {"mug"}))
+    loop = SearchThenSample(
+        Stubborn(), dict.fromkeys(PRIMITIVES, skill), DOMAIN, PlanSettings(tries=5, widenings=1), lambda *_: None
+    )
+    outcome = loop.plan(tabletop("cup mug"), goal_facts(CUP_AWAY), np.random.default_rng(0), Work())
+    assert isinstance(outcome, NoPlan)
+    assert outcome.rounds == 4
+
+
 def test_where_no_choice_puts_the_culprit_out_of_the_way_another_place_is_found(tabletop, stand_in, is_at_start):
     def pick_cup(sample, scene):
-        return {"mug"} if place_of(scene, "mug") in ("table", "right_bin", "dustpan") else None
+        return {"mug"} if place_of(scene, "mug") in ("table", "a_bin", "dustpan") else None
 
     run = Run(stand_in(rule(pick_cup=pick_cup)))
-    solution = run.plan(tabletop("cup mug", bins=("right_bin", "last_bin")), CUP_AWAY)
-    assert "place(mug, last_bin)" in labels(solution)
+    solution = run.plan(tabletop("cup mug", bins=("a_bin", "z_bin")), "(put_away cup)")
+    assert "place(mug, z_bin)" in labels(solution)
     assert len({tuple(plan) for plan in run.rounds}) == len(run.rounds)
+    assert len(run.of("backtracked")) == 4 * (len(run.rounds) - 2)
 
 
 def test_what_was_learned_of_poses_of_the_plan_is_forgotten_with_it(tabletop, stand_in, is_at_start):
     def pick_cup(sample, scene):
-        return {"mug"} if place_of(scene, "mug") in ("table", "right_bin", "dustpan") else None
+        return {"mug"} if place_of(scene, "mug") in ("table", "a_bin", "dustpan") else None
 
     run = Run(stand_in(rule(pick_cup=pick_cup)))
-    run.plan(tabletop("cup mug", bins=("right_bin", "last_bin")), CUP_AWAY)
+    run.plan(tabletop("cup mug", bins=("a_bin", "z_bin")), "(put_away cup)")
+    assert f"mug (even where place(mug, a_bin) leaves it) obstructs {PICK_CUP}" in run.learned
     options = run.loop.learned.constraints()[PICK_CUP]
     assert options == {frozenset({Spot("mug")}), frozenset({Spot("cup")})}
 
 
 def test_the_steps_of_a_solution_speak_the_language_of_the_domain_alone(tabletop, stand_in, is_at_start):
     def pick_cup(sample, scene):
-        return {"mug"} if place_of(scene, "mug") in ("table", "right_bin", "dustpan") else None
+        return {"mug"} if place_of(scene, "mug") in ("table", "a_bin", "dustpan") else None
 
     run = Run(stand_in(rule(pick_cup=pick_cup)))
-    scene = tabletop("cup mug", bins=("right_bin", "last_bin"))
-    solution = run.plan(scene, CUP_AWAY)
+    scene = tabletop("cup mug", bins=("a_bin", "z_bin"))
+    solution = run.plan(scene, "(put_away cup)")
     facts = run.loop.facts(scene)
     for step in solution.plan.steps:
         assert step.applicable(facts)

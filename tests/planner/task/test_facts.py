@@ -56,6 +56,8 @@ def test_what_is_too_small_to_grasp_is_a_crumb_and_a_tool_is_a_tool():
         (at(0, 0, 0.03 * np.sqrt(2), roll=np.pi / 4), "table"),
         (at(0, 1.0, -0.15), "left_bin"),
         (at(0, 1.0, -0.02), "left_bin"),
+        (at(0, 1.0, -0.195), "left_bin"),
+        (at(0, 1.0, -0.205), None),
         (at(0, 1.0, 0.01), None),
         (at(0, 1.245, -0.1), None),
         (at(0.75, 0.1, -0.08), "dustpan"),
