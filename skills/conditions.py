@@ -11,8 +11,8 @@ from planner.task.facts import place_of
 from sim.scene import Held, SceneState, pose_distance
 from skills.context import ActionRun, SkillContext
 
-SLIP_DISTANCE = 0.015
-SLIP_ANGLE = np.radians(15.0)
+SLIP_DISTANCE = 0.02
+SLIP_ANGLE = np.radians(20.0)
 EFFECT_TIME = 1.5
 """Simulated seconds that an effect may take to show (things fall, roll and come to rest)."""
 

@@ -67,6 +67,9 @@ class Refine(Behaviour):
             self.feedback_message = self._outcome.reason
             return Status.FAILURE
         self._run.refinement = self._outcome
+        held = self._context.scene.held
+        if held is not None:
+            self._context.controller.set_payload(*load_of(self._context.scene, held.name))
         return Status.SUCCESS
 
 

@@ -22,10 +22,10 @@ STANDOFF = 0.08
 LIFT = 0.10
 NEAR_SPEED = 0.12
 
-GRIP_FORCE = 40.0
+GRIP_FORCE = 70.0
 """Newtons with which each finger holds something hard."""
 
-SQUEEZE = 0.0025
+SQUEEZE = 0.002
 """Metres by which the fingers may sink into something soft."""
 
 PAD_CONTACTS = 4

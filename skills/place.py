@@ -13,6 +13,7 @@ from planner.task.facts import place_of
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Region, Scenario, Table
 from sim.scene import SceneState
+from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, Refine, guarded, sequence
@@ -105,7 +106,7 @@ class Place:
             retreat = motion.time_line(out, NEAR_SPEED)
             still = descend.standstill(descend.end)
             return (
-                Phase("pre-place", "move", reach, scene.opening, held, touching),
+                Phase("pre-place", "move", carried(robot, reach, held), scene.opening, held, touching),
                 Phase("descend", "approach", descend, scene.opening, held, lowering),
                 Phase("open", "open", still, opening, None, leaving),
                 Phase("retreat", "approach", retreat, opening, None, leaving),

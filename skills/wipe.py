@@ -19,6 +19,7 @@ from scenarios.regions import OUTWARD, interior
 from scenarios.scenario import Region, Scenario
 from scenarios.shapes import Shape, extents
 from sim.scene import Held, SceneState
+from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Refine, Slide, Touch, guarded, sequence
@@ -208,7 +209,7 @@ class Wipe:
                 continue
             press = Press(contact.force, np.array(contact.stiffness))
             return (
-                Phase("pre-wipe", "move", reach, scene.opening, held, touching),
+                Phase("pre-wipe", "move", carried(robot, reach, held), scene.opening, held, touching),
                 Phase(
                     "descend",
                     "touch",

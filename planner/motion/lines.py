@@ -28,7 +28,7 @@ MAX_JOINT_STEP = 0.12
 
 MAX_PATHS = 8
 
-_MARGIN_CLASSES = (0.15, 0.3, 0.45)
+_MARGIN_CLASSES = (0.15, 0.25)
 _SWIVEL_COST = 0.5
 _DRIFT_COST = 0.5
 """Seconds of motion that an elbow one rad off "up", or moving by one rad, counts for in choosing among paths."""
@@ -81,7 +81,7 @@ def track(
     """Joint paths (n,7) through all poses, best first, at most MAX_PATHS.
 
     Every joint stays MIN_MARGIN clear of its limits and moves at most MAX_JOINT_STEP from pose to
-    pose. Paths with a larger worst margin come first (in classes up to 0.45 rad, beyond which more
+    pose. Paths with a larger worst margin come first (in classes up to 0.25 rad, beyond which more
     is no better); among equals postures that differ, then those soon reached from `near` (7,) at
     joint speeds `speed` (7,) and with the elbow high. None at all: the line can't be followed.
     """

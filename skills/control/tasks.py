@@ -8,11 +8,13 @@ redundant robots", 2003 (double diagonalisation); the null-space row follows the
 consistent projection of Khatib, 1987.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
+from numba import njit
 
 from skills.control.state import ArmState, Target
 
@@ -46,7 +48,7 @@ class Task(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class JointTask:
-    """Follow q, v, a (7,) in joint space: q̈* = a + 80 (v − q̇) + 1600 (q − q).
+    """Follow q_d, v_d, a_d (7,) in joint space: q̈* = a_d + 80 (v_d − q̇) + 1600 (q_d − q).
 
     Stiff, because the last joint carries little inertia: there, what the grip on a held thing
     does to the hand (about 0.1 Nm) is answered by this gain times 0.004 kg m².
@@ -74,7 +76,7 @@ class PostureTask:
 
     def rows(self, state: ArmState) -> Rows:
         row = null_direction(state.J) @ state.M
-        row /= np.sqrt(row @ row) + 1e-9
+        row /= math.sqrt(row @ row) + 1e-9
         wanted = self.a + DAMPED * (self.v - state.v) + STIFF * (self.q - state.q)
         return Rows(row[None], np.array([row @ wanted]))
 
@@ -131,23 +133,29 @@ def pose_error(target: Target, state: ArmState) -> np.ndarray:
 
     The rotation comes from the unit quaternion of R_d Rᵀ, on the hemisphere of the shorter turn.
     """
-    x, y, z, w = pin.Quaternion(target.R @ state.R.T).coeffs()
+    turn = pin.Quaternion(target.R @ state.R.T)
+    x, y, z, w = turn.x, turn.y, turn.z, turn.w
     if w < 0.0:
         x, y, z, w = -x, -y, -z, -w
-    sine = np.sqrt(x * x + y * y + z * z)
-    scale = 2.0 if sine < 1e-9 else 2.0 * np.arctan2(sine, w) / sine
+    sine = math.sqrt(x * x + y * y + z * z)
+    scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, w) / sine
     error = np.empty(6)
     error[:3] = target.p - state.p
     error[3:] = scale * x, scale * y, scale * z
     return error
 
 
+@njit(cache=True)
 def null_direction(J: np.ndarray) -> np.ndarray:
     """The joint velocity (7,) that doesn't move the tool: the generalised cross product of J's (6,7)
     rows. It varies smoothly with J and vanishes where the tool loses a freedom."""
-    return _SIGNS * np.linalg.det(J[:, _WITHOUT].transpose(1, 0, 2))
+    direction = np.empty(7)
+    minor = np.empty((6, 6))
+    for i in range(7):
+        minor[:, :i] = J[:, :i]
+        minor[:, i:] = J[:, i + 1 :]
+        direction[i] = (1.0 if i % 2 == 0 else -1.0) * np.linalg.det(minor)
+    return direction
 
 
 _EYE = np.eye(7)
-_SIGNS = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
-_WITHOUT = np.array([[j for j in range(7) if j != i] for i in range(7)])
