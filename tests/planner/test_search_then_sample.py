@@ -233,6 +233,7 @@ def test_going_back_farther_opens_the_later_choices_again(tabletop, stand_in, is
     solution = run.plan(tabletop("cup mug jug", bins=("right_bin",)), goal)
     assert isinstance(solution, Solution)
     assert len(run.of("backtracked")) >= 2
+    assert len(run.rounds) == 2
 
 
 def test_a_grasp_that_the_rest_can_not_use_is_exchanged(tabletop, stand_in):
