@@ -43,9 +43,12 @@ class ContactWrench:
         self._smooth_G = np.zeros(6)
 
     def update(self, q: np.ndarray, v: np.ndarray, wrist: Wrench) -> None:
-        """Read the sensor at configuration q and velocity v (7,), once every period."""
-        a = np.zeros(7) if self._last_v is None else (v - self._last_v) / self._period
-        self._last_v = v
+        """Read the sensor at configuration q and velocity v (7,), once every period. The first reading
+        only prepares for the second."""
+        last, self._last_v = self._last_v, v
+        if last is None:
+            return
+        a = (v - last) / self._period
         robot, data = self._robot, self._data
         pin.forwardKinematics(robot.model, data, q, v, a)
         rotation = pin.updateFramePlacement(robot.model, data, robot.tcp_id).rotation

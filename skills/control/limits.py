@@ -6,7 +6,10 @@ them, braking with the given deceleration keeps the limits afterwards, so they n
 each other.
 """
 
+import math
+
 import numpy as np
+from numba import njit
 
 from skills.control.state import ArmState
 
@@ -23,28 +26,36 @@ class JointLimits:
     def __init__(
         self, q_min: np.ndarray, q_max: np.ndarray, v_max: np.ndarray, braking: np.ndarray, period: float
     ) -> None:
-        self._q_min, self._q_max, self._v_max, self._braking, self._period = q_min, q_max, v_max, braking, period
+        self._limits = np.stack([q_min, q_max, v_max, braking])
+        self._period = period
 
     def bounds(self, state: ArmState) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds (7,) on q̈; lower never exceeds upper."""
-        upper = self._highest(self._q_max - state.q, state.v)
-        lower = -self._highest(state.q - self._q_min, -state.v)
-        return np.minimum(lower, upper), upper
+        lower, upper = np.empty(7), np.empty(7)
+        _fill_bounds(state.q, state.v, self._limits, self._period, lower, upper)
+        return lower, upper
 
-    def _highest(self, room: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Highest acceleration (7,) towards a limit that is `room` (7,) rad ahead, at speed v (7,) towards it."""
-        dt, braking = self._period, self._braking
-        by_speed = (self._v_max - v) / dt
-        # The speed after this step may still be braked to zero within the room that is then left:
-        # (v + a dt)² = 2 braking (room − v dt − a dt²/2), solved for the larger a.
-        half = v + braking * dt / 2
-        square = half * half - v * v + 2 * braking * (room - v * dt)
-        by_room = np.where(
-            square > 0.0,
-            (np.sqrt(np.maximum(square, 0.0)) - half) / dt,
-            (np.minimum(RETURN_RATE * room, 0.0) - v) / dt,
-        )
-        return np.clip(np.minimum(by_speed, by_room), -braking, FREE)
+
+@njit(cache=True)
+def _highest(room: float, v: float, v_max: float, braking: float, dt: float) -> float:
+    """Highest acceleration towards a limit that is `room` rad ahead, at speed v towards it."""
+    by_speed = (v_max - v) / dt
+    # The speed after this step may still be braked to zero within the room that is then left:
+    # (v + a dt)² = 2 braking (room − v dt − a dt²/2), solved for the larger a.
+    half = v + braking * dt / 2
+    square = half * half - v * v + 2 * braking * (room - v * dt)
+    by_room = (math.sqrt(square) - half) / dt if square > 0.0 else (RETURN_RATE * min(room, 0.0) - v) / dt
+    return min(max(min(by_speed, by_room), -braking), FREE)
+
+
+@njit(cache=True)
+def _fill_bounds(
+    q: np.ndarray, v: np.ndarray, limits: np.ndarray, dt: float, lower: np.ndarray, upper: np.ndarray
+) -> None:
+    for i in range(len(q)):
+        q_min, q_max, v_max, braking = limits[0, i], limits[1, i], limits[2, i], limits[3, i]
+        upper[i] = _highest(q_max - q[i], v[i], v_max, braking, dt)
+        lower[i] = min(-_highest(q[i] - q_min, -v[i], v_max, braking, dt), upper[i])
 
 
 class TorqueLimits:

@@ -5,23 +5,24 @@
 Setting up anew costs fifteen times as much as updating the numbers of a fixed dense pattern.
 """
 
+import math
+
 import numpy as np
 import osqp
+from numba import njit
 from scipy import sparse
 
 SOLVED = "solved"
 
 _SETTINGS = {
     "verbose": False,
-    # The caller brings rows of comparable size; OSQP would scale anew at each update.
-    "scaling": 0,
     "rho": 1.0,
     # Counted in iterations, never in seconds: the same numbers give the same answer on any machine.
     "adaptive_rho_interval": 50,
     "check_termination": 5,
     "eps_abs": 1e-7,
     "eps_rel": 1e-7,
-    "max_iter": 2000,
+    "max_iter": 4000,
 }
 
 
@@ -62,18 +63,20 @@ class Workspace:
         """
         R, row_lower, row_upper = rows
         n = self._size
-        self._lower[:n], self._lower[n:] = bounds[0], row_lower
-        self._upper[:n], self._upper[n:] = bounds[1], row_upper
+        lower, upper = self._lower, self._upper
+        lower[:n], lower[n:] = bounds[0], row_lower
+        upper[:n], upper[n:] = bounds[1], row_upper
+        x = np.zeros(n)
+        start = _examine(P, g, R, lower, upper, x)
         # OSQP ignores bounds that cross and answers with the previous problem's optimum; a NaN
         # stays in its iterates for good.
-        if np.any(self._lower > self._upper):
-            return np.zeros(n), "primal infeasible"
-        if not (np.isfinite(P).all() and np.isfinite(g).all() and np.isfinite(R).all()):
-            return np.zeros(n), "problem not finite"
-        self._solver.update(
-            q=g, l=self._lower, u=self._upper, Px=P[self._triangle], Ax=R.T.ravel(), Ax_idx=self._row_entries
-        )
-        self._start_from_free_optimum(P, g, R)
+        if start == _CROSSED:
+            return x, "primal infeasible"
+        if start == _NOT_FINITE:
+            return x, "problem not finite"
+        self._solver.update(q=g, l=lower, u=upper, Px=P[self._triangle], Ax=R.T.ravel(), Ax_idx=self._row_entries)
+        if start == _FREE:
+            self._solver.warm_start(x, self._no_multipliers)
         result = self._solver.solve(raise_error=False)
         status = result.info.status
         if status != SOLVED:
@@ -81,15 +84,59 @@ class Workspace:
             return np.zeros(n), status
         return np.array(result.x), SOLVED
 
-    def _start_from_free_optimum(self, P: np.ndarray, g: np.ndarray, R: np.ndarray) -> None:
-        """Most of the time no limit is active; then the start is already the optimum. Otherwise
-        the last solution is the better start."""
-        try:
-            x = np.linalg.solve(P, -g)
-        except np.linalg.LinAlgError:
-            return
-        n = self._size
-        row = R @ x
-        lower, upper = self._lower, self._upper
-        if (x >= lower[:n]).all() and (x <= upper[:n]).all() and (row >= lower[n:]).all() and (row <= upper[n:]).all():
-            self._solver.warm_start(x, self._no_multipliers)
+
+_FREE, _LIMITED, _CROSSED, _NOT_FINITE = range(4)
+
+
+@njit(cache=True)
+def _examine(P: np.ndarray, g: np.ndarray, R: np.ndarray, lower: np.ndarray, upper: np.ndarray, x: np.ndarray) -> int:
+    """Look at a problem before it is solved. `_FREE`: no limit is active and x now holds the optimum.
+    `_LIMITED`: the unconstrained optimum breaks a limit."""
+    n, m = len(g), len(lower)
+    total = 0.0
+    for i in range(m):
+        if lower[i] > upper[i]:
+            return _CROSSED
+        total += lower[i] - upper[i]
+    for i in range(n):
+        total += g[i]
+        for j in range(n):
+            total += P[i, j]
+    for i in range(m - n):
+        for j in range(n):
+            total += R[i, j]
+    if not math.isfinite(total):
+        return _NOT_FINITE
+    # Cholesky: P = L Lᵀ, then L (Lᵀ x) = −g.
+    L = np.zeros((n, n))
+    for j in range(n):
+        for i in range(j, n):
+            rest = P[i, j]
+            for k in range(j):
+                rest -= L[i, k] * L[j, k]
+            if i > j:
+                L[i, j] = rest / L[j, j]
+            elif rest > 0.0:
+                L[j, j] = math.sqrt(rest)
+            else:
+                return _LIMITED
+    for i in range(n):
+        rest = -g[i]
+        for k in range(i):
+            rest -= L[i, k] * x[k]
+        x[i] = rest / L[i, i]
+    for i in range(n - 1, -1, -1):
+        rest = x[i]
+        for k in range(i + 1, n):
+            rest -= L[k, i] * x[k]
+        x[i] = rest / L[i, i]
+    for i in range(m):
+        value = 0.0
+        if i < n:
+            value = x[i]
+        else:
+            for k in range(n):
+                value += R[i - n, k] * x[k]
+        if value < lower[i] or value > upper[i]:
+            return _LIMITED
+    return _FREE

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
-from qpsolvers import solve_ls
+from qpsolvers import solve_qp
+from scipy import sparse
 
 from sim.plant import Observation
 from sim.robot import GRAVITY, RobotModel
@@ -44,10 +45,11 @@ def estimate_payload(robot: RobotModel, samples: Sequence[Observation]) -> tuple
     # Torques are small numbers: in units of 0.1 m they weigh as much as the forces.
     scale = np.tile([1.0, 1.0, 1.0, 10.0, 10.0, 10.0], len(samples))
     moments_within_reach = np.array([[-REACH, *row] for sign in (1, -1) for row in sign * np.eye(3)])
-    solution = solve_ls(
-        np.vstack([A * scale[:, None], 1e-4 * np.eye(4)]),
-        np.concatenate([b * scale, np.zeros(4)]),
-        G=moments_within_reach,
+    A, b = A * scale[:, None], b * scale
+    solution = solve_qp(
+        sparse.csc_matrix(A.T @ A + 1e-6 * np.eye(4)),
+        -A.T @ b,
+        G=sparse.csc_matrix(moments_within_reach),
         h=np.zeros(6),
         lb=np.array([0.0, -np.inf, -np.inf, -np.inf]),
         solver="osqp",

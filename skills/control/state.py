@@ -50,7 +50,7 @@ def measure(robot: RobotModel, data: pin.Data, q: np.ndarray, v: np.ndarray) -> 
     bias = pin.nonLinearEffects(model, data, q, v)
     M = pin.crba(model, data, q)
     M_inverse = pin.computeMinverse(model, data, q)
-    J = pin.computeFrameJacobian(model, data, q, tool, WORLD_AXES)
+    J = np.ascontiguousarray(pin.computeFrameJacobian(model, data, q, tool, WORLD_AXES))
     pin.forwardKinematics(model, data, q, v, _AT_REST)
     pose = pin.updateFramePlacement(model, data, tool)
     return ArmState(

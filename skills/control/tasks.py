@@ -14,7 +14,6 @@ from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 
 from skills.control.state import ArmState, Target
 
@@ -145,17 +144,12 @@ def pose_error(target: Target, state: ArmState) -> np.ndarray:
     return error
 
 
-@njit(cache=True)
 def null_direction(J: np.ndarray) -> np.ndarray:
     """The joint velocity (7,) that doesn't move the tool: the generalised cross product of J's (6,7)
     rows. It varies smoothly with J and vanishes where the tool loses a freedom."""
-    direction = np.empty(7)
-    minor = np.empty((6, 6))
-    for i in range(7):
-        minor[:, :i] = J[:, :i]
-        minor[:, i:] = J[:, i + 1 :]
-        direction[i] = (1.0 if i % 2 == 0 else -1.0) * np.linalg.det(minor)
-    return direction
+    return _SIGNS * np.linalg.det(J[:, _WITHOUT].transpose(1, 0, 2))
 
 
 _EYE = np.eye(7)
+_SIGNS = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+_WITHOUT = np.array([[j for j in range(7) if j != i] for i in range(7)])

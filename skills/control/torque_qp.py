@@ -56,15 +56,14 @@ class TorqueQP:
         Whenever the solver ends with anything but "solved", the last solution fades, tick by tick,
         into braking under gravity compensation, clipped to the torque limits.
         """
-        rows = [task.rows(state) for task in tasks]
-        A = np.vstack([row.A for row in rows])
-        b = np.concatenate([row.b for row in rows])
-        weights = np.repeat([row.weight for row in rows], [len(row.b) for row in rows])
-        weighted = A.T * weights
-        P = weighted @ A
-        P[_DIAGONAL] += REGULARISATION
+        P, g = REGULARISATION * np.eye(7), np.zeros(7)
+        for task in tasks:
+            rows = task.rows(state)
+            weighted = rows.weight * rows.A.T
+            P += weighted @ rows.A
+            g -= weighted @ rows.b
         bounds = self._joint_limits.bounds(state)
-        a, status = self._workspace.solve(P, -(weighted @ b), bounds, self._torque_limits.rows(state, feedforward))
+        a, status = self._workspace.solve(P, g, bounds, self._torque_limits.rows(state, feedforward))
         if status != SOLVED:
             return self._fall_back(state, bounds, status)
         tau = state.M @ a + state.bias + feedforward
@@ -80,6 +79,3 @@ class TorqueQP:
         self._last, self._last_feedforward = a, FALLBACK_DECAY * self._last_feedforward
         tau = state.M @ a + state.bias + self._last_feedforward
         return Solution(self._torque_limits.clip(tau), a, status)
-
-
-_DIAGONAL = np.diag_indices(7)

@@ -1,0 +1,177 @@
+import numpy as np
+import pytest
+import qpsolvers
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from skills.control.limits import JointLimits
+from skills.control.osqp_ import Workspace
+from skills.control.state import Target, measure
+from skills.control.tasks import HybridTask, JointTask, PostureTask
+from skills.control.torque_qp import FALLBACK_DAMPING, TorqueQP
+
+PERIOD = 0.002
+NOTHING = np.zeros(7)
+
+
+def random_problem(seed):
+    """Positive definite P, and limits of which some are active."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(7, 7))
+    R = rng.normal(size=(7, 7))
+    width = rng.uniform(0.1, 3.0, 14)
+    return (
+        root @ root.T + 0.1 * np.eye(7),
+        5.0 * rng.normal(size=7),
+        (-width[:7], width[:7]),
+        (R, -width[7:], width[7:]),
+    )
+
+
+def random_state(robot, rng):
+    q = robot.q_min + (robot.q_max - robot.q_min) * rng.uniform(0.05, 0.95, 7)
+    return measure(robot, robot.data(), q, robot.v_max * rng.uniform(-0.9, 0.9, 7))
+
+
+@pytest.fixture(scope="module")
+def workspace():
+    return Workspace(7, 7)
+
+
+@settings(max_examples=60, derandomize=True, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_the_optimum_is_that_of_another_solver(workspace, seed):
+    P, g, (lower, upper), (R, row_lower, row_upper) = random_problem(seed)
+    x, status = workspace.solve(P, g, (lower, upper), (R, row_lower, row_upper))
+    G, h = np.vstack([R, -R]), np.concatenate([row_upper, -row_lower])
+    reference = qpsolvers.solve_qp(P, g, G=G, h=h, lb=lower, ub=upper, solver="daqp")
+    assert status == "solved"
+    np.testing.assert_allclose(x, reference, atol=1e-4)
+
+
+def test_the_persistent_workspace_answers_like_a_fresh_one(workspace):
+    for seed in range(20):
+        problem = random_problem(seed)
+        np.testing.assert_allclose(workspace.solve(*problem)[0], Workspace(7, 7).solve(*problem)[0], atol=1e-5)
+
+
+def test_bounds_that_cross_are_infeasible_instead_of_silently_ignored(workspace):
+    P, g, (lower, upper), rows = random_problem(0)
+    lower = lower.copy()
+    lower[3] = upper[3] + 1.0
+    assert workspace.solve(P, g, (lower, upper), rows)[1] == "primal infeasible"
+
+
+def test_a_problem_with_no_feasible_point_is_reported_and_forgotten(workspace):
+    P, g, (lower, upper), _ = random_problem(0)
+    far = np.full(7, 100.0)
+    assert workspace.solve(P, g, (lower, upper), (np.eye(7), far, far))[1] == "primal infeasible"
+    assert workspace.solve(*random_problem(1))[1] == "solved"
+
+
+@pytest.mark.parametrize("part", ["P", "g", "R", "bound"])
+def test_a_number_that_is_not_finite_is_reported_and_forgotten(workspace, part):
+    P, g, (lower, upper), (R, row_lower, row_upper) = random_problem(0)
+    g, lower = g.copy(), lower.copy()
+    {"P": P, "g": g, "R": R, "bound": lower}[part].flat[2] = np.nan
+    assert workspace.solve(P, g, (lower, upper), (R, row_lower, row_upper))[1] == "problem not finite"
+    assert workspace.solve(*random_problem(1))[1] == "solved"
+
+
+def test_too_few_iterations_are_reported():
+    P, g, bounds, rows = random_problem(3)
+    assert Workspace(7, 7, max_iter=1).solve(P, g, bounds, rows)[1] == "maximum iterations reached"
+
+
+@settings(max_examples=60, derandomize=True, deadline=None)
+@given(seed=st.integers(0, 10**6), demand=st.floats(0.01, 3.0))
+def test_torques_and_accelerations_keep_their_limits_whatever_is_asked(robot, seed, demand):
+    rng = np.random.default_rng(seed)
+    state = random_state(robot, rng)
+    target = Target(state.p + demand * rng.normal(size=3), state.R, np.zeros(6), np.zeros(6))
+    goal = state.q + demand * rng.normal(size=7)
+    tasks = [
+        [JointTask(goal, NOTHING, NOTHING)],
+        [HybridTask(target, np.eye(3)), PostureTask(goal, NOTHING, NOTHING)],
+    ][seed % 2]
+    qp = TorqueQP(robot, PERIOD)
+    solution = qp.solve(state, tasks, state.J.T @ (10.0 * rng.normal(size=6)))
+    lower, upper = JointLimits(robot.q_min, robot.q_max, robot.v_max, robot.a_max, PERIOD).bounds(state)
+    assert np.all(np.abs(solution.tau) <= robot.tau_max)
+    assert solution.is_fallback or np.all((solution.a >= lower - 1e-2) & (solution.a <= upper + 1e-2))
+    assert qp.torque_limit_violations == 0
+
+
+def test_tasks_are_met_exactly_while_no_limit_is_near(robot):
+    state = measure(robot, robot.data(), np.radians([10.0, 30.0, 5.0, -80.0, 0.0, 60.0, 20.0]), NOTHING)
+    target = Target(state.p, state.R, np.zeros(6), np.array([0.5, -1.0, 0.0, 2.0, 1.0, -1.0]))
+    solution = TorqueQP(robot, PERIOD).solve(
+        state, [HybridTask(target, np.eye(3)), PostureTask(state.q, NOTHING, NOTHING)], NOTHING
+    )
+    np.testing.assert_allclose(state.J @ solution.a, target.A, atol=1e-3)
+
+
+class FixedAnswer:
+    """Stands where the OSQP workspace does and gives one answer."""
+
+    def __init__(self, a, status):
+        self._answer = a, status
+
+    def solve(self, *_):
+        return self._answer
+
+
+def test_a_solution_beyond_a_torque_limit_is_counted_not_hidden(robot):
+    state = random_state(robot, np.random.default_rng(4))
+    qp = TorqueQP(robot, PERIOD)
+    qp._workspace = FixedAnswer(np.linalg.solve(state.M, 1.001 * robot.tau_max - state.bias), "solved")
+    solution = qp.solve(state, [JointTask(state.q, NOTHING, NOTHING)], NOTHING)
+    assert qp.torque_limit_violations == 1
+    assert np.all(np.abs(solution.tau) > robot.tau_max)
+
+
+@pytest.mark.parametrize(
+    "status",
+    [
+        "solved inaccurate",
+        "primal infeasible",
+        "primal infeasible inaccurate",
+        "dual infeasible",
+        "dual infeasible inaccurate",
+        "maximum iterations reached",
+        "run time limit reached",
+        "problem non convex",
+        "interrupted",
+        "unsolved",
+        "problem not finite",
+    ],
+)
+def test_every_status_but_solved_fades_into_braking_within_the_limits(robot, status):
+    state = random_state(robot, np.random.default_rng(5))
+    qp = TorqueQP(robot, PERIOD)
+    before = qp.solve(state, [JointTask(state.q + 0.01, NOTHING, NOTHING)], NOTHING)
+    qp._workspace = FixedAnswer(np.full(7, np.nan), status)
+    solutions = [qp.solve(state, [JointTask(state.q + 0.01, NOTHING, NOTHING)], NOTHING) for _ in range(60)]
+    assert all(s.is_fallback and np.all(np.abs(s.tau) <= robot.tau_max) for s in solutions)
+    assert qp.fallbacks == 60
+    assert np.linalg.norm(solutions[0].a - before.a) < np.linalg.norm(solutions[-1].a - before.a)
+    lower, upper = JointLimits(robot.q_min, robot.q_max, robot.v_max, robot.a_max, PERIOD).bounds(state)
+    np.testing.assert_allclose(solutions[-1].a, np.clip(-FALLBACK_DAMPING * state.v, lower, upper), atol=1e-3)
+
+
+def test_the_solver_is_used_again_after_a_fallback(robot):
+    state = random_state(robot, np.random.default_rng(6))
+    task = [JointTask(state.q, NOTHING, NOTHING)]
+    qp = TorqueQP(robot, PERIOD)
+    beyond_all_torques = np.full(7, 1e6)
+    assert qp.solve(state, task, beyond_all_torques).status == "primal infeasible"
+    assert qp.solve(state, task, NOTHING).status == "solved"
+    assert qp.fallbacks == 1
+
+
+def test_running_out_of_iterations_falls_back(robot):
+    state = random_state(robot, np.random.default_rng(6))
+    qp = TorqueQP(robot, PERIOD, max_iter=1)
+    solution = qp.solve(state, [JointTask(state.q + 3.0, NOTHING, NOTHING)], NOTHING)
+    assert solution.status == "maximum iterations reached"
+    assert np.all(np.abs(solution.tau) <= robot.tau_max)
