@@ -187,7 +187,8 @@ class SearchThenSample:
         work.add("expansions", found.expansions)
         plan = [str(action) for action in found.actions] if isinstance(found, TaskPlan) else None
         event = {"round": number, "domain": texts[0], "problem": texts[1], "plan": plan}
-        self._report("round", {**event, "expansions": found.expansions, "proofs_only": learned is not self.learned})
+        kind = "round" if learned is self.learned else "proof_sought"
+        self._report(kind, {**event, "expansions": found.expansions})
         return problem, found
 
     def _learn_from(self, stuck: Stuck, rest: tuple[Step, ...], rng: np.random.Generator, work: Work) -> None:

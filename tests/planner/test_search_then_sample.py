@@ -46,7 +46,7 @@ class Run:
     @property
     def rounds(self):
         """The task plans in turn."""
-        return [event["plan"] for event in self.of("round") if not event["proofs_only"]]
+        return [event["plan"] for event in self.of("round")]
 
     @property
     def learned(self):
