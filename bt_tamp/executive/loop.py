@@ -3,6 +3,7 @@
 import resource
 import time
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from py_trees.common import Status
@@ -31,6 +32,7 @@ class Tally:
 
     energy_j: float = 0.0
     peak_force_n: float = 0.0
+    learned: dict[str, None] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
 
 
@@ -50,13 +52,15 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
     tally = Tally()
     clock = [0.0]
 
-    machine: Machine | None = None
+    def report(kind: str, **data: Any) -> None:
+        if kind == "learned":
+            tally.learned[data["sentence"]] = None
+        _report(recorder, clock[0], kind, data, machine.planner.thinking.rounds)
 
-    def report(kind: str, **data: object) -> None:
-        earlier_rounds = machine.planner.thinking.rounds if machine else 0
-        _report(recorder, clock[0], kind, data, earlier_rounds)
+    def tree_changed(why: str) -> None:
+        recorder.tree(machine.mission.root, why)
 
-    machine = build(scenario, options, report, lambda why: recorder.tree(machine.mission.root, why))
+    machine = build(scenario, options, report, tree_changed)
     audit = ContactAudit(machine.robot, scenario)
     report("run_started", scene=scenario.name, seed=scenario.seed)
     try:
@@ -149,7 +153,7 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audit: Contact
         goal={str(fact): fact in known for fact in sorted(agenda.goal)},
         plan=tuple(str(action) for action in agenda.plan.actions) if agenda.plan else (),
         executed=tuple(str(action) for action in agenda.executed),
-        learned=tuple(machine.planner.search.learned.sentences()),
+        learned=tuple(tally.learned),
         places=places,
         rounds=thinking.rounds,
         replans=max(0, thinking.plans - 1),
@@ -165,9 +169,10 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audit: Contact
     )
 
 
-def _report(recorder: RunRecorder, t: float, kind: str, data: dict, earlier_rounds: int) -> None:
-    if kind == "round":
+def _report(recorder: RunRecorder, t: float, kind: str, data: dict[str, Any], earlier_rounds: int) -> None:
+    if kind in ("round", "proof_sought"):
         data["round"] += earlier_rounds
-        recorder.pddl(data["round"], data.pop("domain"), data.pop("problem"))
-        recorder.plan(data["round"], "\n".join(data["plan"]) if data["plan"] else "no plan")
+        name = f"round-{data['round']:02d}" + ("-proof" if kind == "proof_sought" else "")
+        recorder.pddl(name, data.pop("domain"), data.pop("problem"))
+        recorder.plan(name, "no plan" if data["plan"] is None else "\n".join(data["plan"]))
     recorder.event(kind, t, **data)

@@ -111,14 +111,14 @@ class RunRecorder:
         self.folder.write(f"{stem}.txt", to_unicode(self.last_tree) + "\n")
         self.folder.write(f"{stem}.svg", to_svg(self.last_tree))
 
-    def pddl(self, number: int, domain: str, problem: str) -> None:
-        """The files handed to the task planner in round `number` (from 1)."""
-        self._text(f"{PDDL}/round-{number:02d}-domain.pddl", domain)
-        self._text(f"{PDDL}/round-{number:02d}-problem.pddl", problem)
+    def pddl(self, name: str, domain: str, problem: str) -> None:
+        """The files handed to the task planner; `name` says in which round."""
+        self._text(f"{PDDL}/{name}-domain.pddl", domain)
+        self._text(f"{PDDL}/{name}-problem.pddl", problem)
 
-    def plan(self, number: int, text: str) -> None:
-        """The plan of round `number` as text, one action a line."""
-        self._text(f"{PLANS}/round-{number:02d}.txt", text if text.endswith("\n") else text + "\n")
+    def plan(self, name: str, text: str) -> None:
+        """The plan of a round as text, one action a line."""
+        self._text(f"{PLANS}/{name}.txt", text if text.endswith("\n") else text + "\n")
 
     def finish(self, result: RunResult) -> None:
         """The run has ended: everything is written, `result.json` last."""

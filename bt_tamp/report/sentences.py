@@ -1,0 +1,57 @@
+"""What an event says to a person, in one sentence."""
+
+from bt_tamp.report.events import Event
+
+
+def sentence(event: Event) -> str | None:
+    """The event as a sentence without a full stop; None for events that only mark progress."""
+    data = event.data
+    match event.kind:
+        case "run_started":
+            return f"{data['scene']}, seed {data['seed']}"
+        case "round":
+            return f"round {data['round']}: {_proposal(data['plan'])}"
+        case "proof_sought":
+            return _proof(data["plan"])
+        case "refinement_failed":
+            return f"{data['action']} can't be done like this: {data['reason']}{in_the_way(event)}"
+        case "backtracked":
+            return f"another choice for {data['to']}, so that {data['action']} may work"
+        case "learned":
+            return f"learned: {data['sentence']}"
+        case "widened":
+            return f"nothing left to try so: {data['tries']} samples for each action from now on"
+        case "plan_installed":
+            return f"plan: {' → '.join(data['actions']) or 'nothing to do'}"
+        case "action_failed":
+            return f"{data['action']} failed: {data['reason']}"
+        case "replan":
+            return f"planning again: {data['reason']}"
+        case "goal_reached":
+            return "goal reached"
+        case "run_ended" if data["outcome"] != "goal_reached":
+            return f"{data['outcome'].replace('_', ' ')}: {data['sentence']}"
+    return None
+
+
+def in_the_way(event: Event) -> str:
+    """The culprits of a failure, to be put after its reason; nothing without culprits."""
+    culprits = event.data.get("culprits") or ()
+    return f"; in the way: {', '.join(culprits)}" if culprits else ""
+
+
+def counted(number: int, what: str) -> str:
+    """A number with its noun, in the plural where it is due."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+
+
+def _proposal(plan: list[str] | None) -> str:
+    if plan is None:
+        return "by what is known, no sequence of actions leads to the goal"
+    return f"the task planner proposes {' → '.join(plan) or 'nothing to do'}"
+
+
+def _proof(plan: list[str] | None) -> str:
+    if plan is None:
+        return "even by what is proven alone, no sequence of actions leads to the goal"
+    return "by what is proven alone, the goal isn't out of reach"

@@ -1,0 +1,163 @@
+"""The story of a run in plain English, from its events: plans, what failed, why, what was learned, how it ended."""
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from bt_tamp.report.events import Event
+from bt_tamp.report.result import RunResult
+from bt_tamp.report.sentences import counted, in_the_way
+
+WIDTH = 100
+
+
+def story(events: Iterable[Event], result: RunResult | None) -> str:
+    """The whole story, lines of at most `WIDTH` characters. Without a result it says that the run was cut off."""
+    teller = _Teller()
+    for event in events:
+        teller.hear(event)
+    teller.end(result)
+    return "\n".join(teller.lines)
+
+
+class _Teller:
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self._plans = 0
+        self._proposed: list[str] | None = None
+        self._is_planning = False
+        self._started: dict[str, float] = {}
+        self._phases: list[str] = []
+        self._number = 0
+        self._last_failure = ""
+
+    def hear(self, event: Event) -> None:
+        tell = getattr(self, f"_{event.kind}", None)
+        if tell is not None:
+            tell(event, event.data)
+
+    def _run_started(self, event: Event, data: Any) -> None:
+        noise = "the nominal scene" if data["seed"] == 0 else "with that seed's noise"
+        self._heading(f"{data['scene']}, seed {data['seed']} ({noise})")
+
+    def _round(self, event: Event, data: Any) -> None:
+        if not self._is_planning:
+            self._is_planning = True
+            self._proposed = None
+            self._heading(f"Planning, at {event.t:.1f} s" if self._plans else "Planning before the first motion")
+        plan = data["plan"]
+        lead = f"Round {data['round']}: "
+        if plan is None:
+            self._say(f"{lead}with what had been learned, no sequence of actions led to the goal.")
+        else:
+            self._say(f"{lead}{_proposal(plan, self._proposed)}")
+            self._proposed = plan
+
+    def _proof_sought(self, event: Event, data: Any) -> None:
+        self._say(_by_proofs(data["plan"]), "  - ")
+
+    def _refinement_failed(self, event: Event, data: Any) -> None:
+        self._say(f"{data['action']} could not be worked out: {data['reason']}{in_the_way(event)}.", "  - ")
+
+    def _backtracked(self, event: Event, data: Any) -> None:
+        self._say(f"So another choice was made for {data['to']}.", "  - ")
+
+    def _learned(self, event: Event, data: Any) -> None:
+        self._say(f"Learned: {data['sentence']}.", "  - ")
+
+    def _widened(self, event: Event, data: Any) -> None:
+        self._say(
+            f"Nothing was left to try within the budget, so it was widened to {data['tries']} samples for each action,"
+            " and what rested on fewer samples was taken back.",
+            "  - ",
+        )
+
+    def _solved(self, event: Event, data: Any) -> None:
+        steps = counted(len(data["plan"]), "action")
+        self._say(f"A way was found to do all of it: {steps}, after {counted(data['rounds'], 'round')}.", "  - ")
+
+    def _plan_installed(self, event: Event, data: Any) -> None:
+        self._plans += 1
+        self._is_planning = False
+        self._heading(f"Plan {self._plans}, in force from {event.t:.1f} s")
+        for number, action in enumerate(data["actions"], start=1):
+            self._say(action, f"  {number:2}. ")
+        self._heading("What was done")
+
+    def _action_started(self, event: Event, data: Any) -> None:
+        self._started[data["action"]] = event.t
+        self._phases = []
+
+    def _phase(self, event: Event, data: Any) -> None:
+        self._phases.append(data["phase"])
+
+    def _action_done(self, event: Event, data: Any) -> None:
+        start = self._started.get(data["action"], event.t)
+        self._say(f"{data['action']}: {', '.join(self._phases)}.", f"{start:7.1f} – {event.t:5.1f} s  ")
+
+    def _action_failed(self, event: Event, data: Any) -> None:
+        where = f" in its phase {self._phases[-1]!r}" if self._phases else ""
+        self._last_failure = data["reason"]
+        self._say(f"{data['action']} failed{where}: {data['reason']}.", f"{event.t:7.1f} s          ")
+
+    def _replan(self, event: Event, data: Any) -> None:
+        reason = "" if data["reason"] == self._last_failure else f", because {data['reason']}"
+        self._say(f"The plan was dropped{reason}, and a new one sought from what was observed then.")
+
+    def _goal_reached(self, event: Event, data: Any) -> None:
+        self._say("Every literal of the goal held, everything at rest.", f"{event.t:7.1f} s          ")
+
+    def end(self, result: RunResult | None) -> None:
+        self._heading("How it ended")
+        if result is None:
+            self._say("The run was cut off: it left no result.")
+            return
+        self._say(f"{_ENDINGS[result.outcome]}: {result.reason}.")
+        missing = [literal for literal, holds in result.goal.items() if not holds]
+        if missing:
+            self._say(f"Of the goal, {', '.join(missing)} did not hold.")
+        self._say(
+            f"Robot time {result.robot_s:.1f} s, real time {result.wall_s:.1f} s, of which planning took"
+            f" {result.planning_wall_s:.1f} s ({result.planning_cpu_s:.1f} s of CPU,"
+            f" {counted(result.rounds, 'round')}, {counted(result.replans, 'replan')}). Contact force reached"
+            f" {result.peak_contact_force_n:.1f} N; {counted(len(result.unintended_contacts), 'unintended contact')}."
+        )
+        for touch in result.unintended_contacts:
+            doing = " ".join(part for part in (touch.action, touch.phase) if part)
+            self._say(f"{touch.first} and {touch.second} at {touch.t:.1f} s, {touch.force_n:.1f} N ({doing})", "  - ")
+
+    def _heading(self, text: str) -> None:
+        self.lines += [""] * bool(self.lines) + [text]
+
+    def _say(self, text: str, lead: str = "  ") -> None:
+        self.lines += textwrap.wrap(text, WIDTH, initial_indent=lead, subsequent_indent=" " * len(lead)) or [lead]
+
+
+_ENDINGS = {
+    "goal_reached": "The goal was reached",
+    "planned": "A plan was found",
+    "proven_infeasible": "It was proven that the goal can't be reached",
+    "no_plan": "No plan was found within the budget",
+    "gave_up": "The run gave up",
+    "interrupted": "It was stopped",
+}
+
+
+def _by_proofs(plan: Sequence[str] | None) -> str:
+    if plan is None:
+        return "Even if all were possible that isn't proven impossible, nothing would lead to the goal."
+    return "By proofs alone the goal isn't out of reach: the obstacles found so far rest on samples."
+
+
+def _proposal(plan: Sequence[str], before: Sequence[str] | None) -> str:
+    """The proposed plan: whole when it is the first, else what is new in it."""
+    if not plan:
+        return "nothing was left to do."
+    if before is None:
+        return f"the task planner proposed {', '.join(plan)}."
+    new = [action for action in plan if action not in before]
+    gone = [action for action in before if action not in plan]
+    if not new and not gone:
+        return f"the same actions again, {'in the same order' if list(plan) == list(before) else 'in another order'}."
+    parts = [f"with {', '.join(new)}"] * bool(new) + [f"without {', '.join(gone)}"] * bool(gone)
+    return f"a plan of {counted(len(plan), 'action')}, now {' and '.join(parts)}."
