@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from pinocchio import SE3
 
+from planner.motion.chain import chain, placement
 from planner.motion.kernels import (
     BOX,
     CYLINDER,
@@ -72,7 +73,7 @@ def hand_hits(robot: RobotModel, scene: SceneState, X_WG: SE3, margins: Margins)
     arm = _arm_arrays(robot, scene.opening, _held(scene))
     names, table = _obstacle_rows(Standing(scene))
     X_W7 = X_WG * robot.model.frames[robot.tcp_id].placement.inverse()
-    hits = hand_contacts(_placement(X_W7), arm.solids, table, margins.table(part_names(robot, scene.held), names))
+    hits = hand_contacts(placement(X_W7)[None], arm.solids, table, margins.table(part_names(robot, scene.held), names))
     return frozenset(name for name, hit in zip(names, hits, strict=True) if hit)
 
 
@@ -105,20 +106,17 @@ def _kind(shape: Shape) -> int:
             return SPHERE
 
 
-class _Chain(NamedTuple):
-    joints: np.ndarray
-    base: np.ndarray
-    spheres: np.ndarray
+class _Spheres(NamedTuple):
+    """The arm's spheres, see `ArmArrays`."""
+
+    table: np.ndarray
     first: np.ndarray
     covers: np.ndarray
 
 
-@lru_cache(maxsize=8)
-def _chain(robot: RobotModel) -> _Chain:
-    """The arm without the hand, which never changes."""
-    if any(joint.shortname() != "JointModelRZ" for joint in robot.model.joints[1:]) or robot.model.nq != 7:
-        raise ValueError(f"robot {robot.name!r}: seven revolute joints about z expected")
-    spheres: list[np.ndarray] = []
+@lru_cache(maxsize=16)
+def _spheres(robot: RobotModel) -> _Spheres:
+    tables: list[np.ndarray] = []
     first, covers = [0], np.zeros((ARM_LINKS, 4))
     for k, link in enumerate(robot.links[:ARM_LINKS]):
         own = []
@@ -130,18 +128,13 @@ def _chain(robot: RobotModel) -> _Chain:
         table = np.array(own)
         covers[k, :3] = table[:, :3].mean(axis=0)
         covers[k, 3] = np.max(np.linalg.norm(table[:, :3] - covers[k, :3], axis=1) + table[:, 3])
-        spheres.append(table)
+        tables.append(table)
         first.append(first[-1] + len(table))
-    joints = np.array([_placement(X) for X in robot.model.jointPlacements[1:]])
-    return _Chain(joints, _placement(robot.X_WB), np.concatenate(spheres), np.array(first), covers)
-
-
-def _placement(X: SE3) -> np.ndarray:
-    return np.concatenate([X.rotation.ravel(), X.translation])
+    return _Spheres(np.concatenate(tables), np.array(first), covers)
 
 
 def _solid_row(shape: Shape, X: SE3, part: int) -> np.ndarray:
-    return np.concatenate([[_kind(shape), part, bounding_radius(shape)], extents(shape) / 2, _placement(X)])
+    return np.concatenate([[_kind(shape), part, bounding_radius(shape)], extents(shape) / 2, placement(X)])
 
 
 @lru_cache(maxsize=64)
@@ -159,7 +152,6 @@ def _hand_rows(robot: RobotModel, opening: float) -> np.ndarray:
 
 
 def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | None) -> ArmArrays:
-    chain = _chain(robot)
     X_7G = robot.model.frames[robot.tcp_id].placement
     solids = _hand_rows(robot, opening)
     probes = X_7G.translation[None]
@@ -169,7 +161,9 @@ def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | No
         solids = np.concatenate([solids, _solid_row(shape, X_7O, len(robot.links))[None]])
         corners = _CORNERS * (extents(shape) / 2) @ X_7O.rotation.T + X_7O.translation
         probes = np.concatenate([probes, corners])
-    return ArmArrays(*chain[:2], np.stack([robot.q_min, robot.q_max]), *chain[2:], solids, probes)
+    limits = np.stack([robot.q_min, robot.q_max])
+    probes = np.append(probes, np.zeros((len(probes), 1)), axis=1)
+    return ArmArrays(*chain(robot), limits, *_spheres(robot), solids, probes)
 
 
 @lru_cache(maxsize=64)

@@ -1,18 +1,19 @@
 """The exact collision model: distances between primitives by coal, many configurations at a time.
 
-It shares no arithmetic with the fast model. Bounding boxes, in numpy, sort out what is far apart;
-coal measures the rest.
+It shares the forward kinematics with the fast model, but no geometry. World bounds sort out what is far
+apart; coal measures the rest.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
 from pinocchio import SE3
 
+from planner.motion.broad import near_pairs, place_solids
 from planner.motion.chain import place_links
 from planner.motion.collision import ARM_LINKS, part_names, self_collision_pairs
 from planner.motion.world import Margins, Standing
@@ -48,19 +49,18 @@ class _Solid:
     geometry: Any
 
 
-_Posed = tuple[_Solid, Any]
-"""A solid with its coal transform in W."""
+_UNTURNED = np.eye(3)
 
 
 class _Fixed:
-    """What stands in the scene: solids, their coal transforms, world bounds lower, upper (o,3)."""
+    """What stands in the scene: solids, their coal transforms, world bounds lower, upper (1,o,3)."""
 
     def __init__(self, standing: Standing) -> None:
         self.solids = [_solid(o.name, -1, o.X_WS, o.shape) for o in standing.obstacles]
         self.transforms = [coal.Transform3s(solid.X.rotation, solid.X.translation) for solid in self.solids]
         centres = np.array([solid.X.translation for solid in self.solids])
         reach = np.array([np.abs(solid.X.rotation) @ solid.half for solid in self.solids])
-        self.lower, self.upper = centres - reach, centres + reach
+        self.lower, self.upper = (centres - reach)[None], (centres + reach)[None]
 
 
 class _Moving:
@@ -74,27 +74,28 @@ class _Moving:
         self.link = np.array([solid.link for solid in self.solids])
         self.half = np.array([solid.half for solid in self.solids])
         self._p = np.array([solid.X.translation for solid in self.solids])
-        self._R_riders = np.array([solid.X.rotation for solid in self.solids[self.arm :]])
+        self._R = np.array([solid.X.rotation for solid in self.solids[self.arm :]])
 
     def placed(self, q: np.ndarray) -> "_Placed":
         """All solids in W at configurations q (n,7)."""
-        R_link, p_link = place_links(self._robot, q)
-        p = p_link[:, self.link] + (R_link[:, self.link] @ self._p[:, :, None])[..., 0]
-        R = R_link[:, ARM_LINKS - 1, None] @ self._R_riders
-        reach = np.empty_like(p)
-        reach[:, : self.arm] = self.half[: self.arm]
-        reach[:, self.arm :] = (np.abs(R) @ self.half[self.arm :, :, None])[..., 0]
-        return _Placed(p, R, p - reach, p + reach)
+        return _Placed(*place_solids(place_links(self._robot, q), self.link, self._p, self._R, self.half))
 
 
-@dataclass(frozen=True)
-class _Placed:
-    """Moving solids at n configurations: centres p (n,m,3), the riders' rotations R (n,r,3,3), world bounds (n,m,3)."""
+class _Placed(NamedTuple):
+    """Moving solids at n configurations: centres p (n,m,3), world bounds (n,m,3), the riders' rotations R (n,r,3,3)."""
 
     p: np.ndarray
-    R: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
+    R: np.ndarray
+
+
+def _any(pair: Pair) -> bool:
+    return True
+
+
+def _none(pair: Pair) -> bool:
+    return False
 
 
 class ExactChecker:
@@ -107,6 +108,7 @@ class ExactChecker:
         self._fixed = _fixed(Standing(scene))
         self._moving = _Moving(robot, scene)
         parts = part_names(robot, scene.held)
+        self._solids = [*self._moving.solids, *self._fixed.solids]
         names = [solid.name for solid in self._moving.solids]
         self._outward = _outward_pairs(parts, names, self._moving.link, self._fixed.solids, margins)
         self._inward = _inward_pairs(parts, tuple(names), margins)
@@ -114,75 +116,83 @@ class ExactChecker:
 
     def is_free(self, q: np.ndarray) -> bool:
         """Is q (7,) within the joint limits and free of collision?"""
-        return self._within_limits(q) and not self._contacts(q[None], True)
+        return self._within_limits(q) and not self.contacts(q[None], _any)
 
     def edge_is_free(self, qa: np.ndarray, qb: np.ndarray) -> bool:
         """Is the straight edge from qa to qb free, at JOINT_STEP and TRAVEL_STEP?"""
-        return self._within_limits(qb) and not self._contacts(self.densified(np.stack([qa, qb])), True)
+        return self._within_limits(qb) and not self.contacts(self.densified(np.stack([qa, qb])), _any)
 
     def colliding_pairs(self, q: np.ndarray) -> frozenset[Pair]:
         """Names of the robot's parts (or the held body) and what they hit at q (7,), or hit among each other."""
         return frozenset(contact.pair for contact in self.contacts(q[None]))
 
-    def contacts(self, q: np.ndarray) -> list[Contact]:
+    def contacts(self, q: np.ndarray, enough: Callable[[Pair], bool] = _none) -> list[Contact]:
         """What comes nearer than its margin at the configurations q (n,7): for each pair the first one, closest part.
 
-        Sorted by index, then by names.
+        The search ends early with the first pair that is `enough`. Sorted by index, then by names.
         """
-        found = self._contacts(q, False)
-        return sorted(found, key=lambda contact: (contact.index, sorted(contact.pair)))
+        self.checks += len(q)
+        placed = self._moving.placed(q)
+        found: dict[Pair, Contact] = {}
+        for index, a, b, margin in self._candidates(placed):
+            pair = frozenset((self._solids[a].name, self._solids[b].name))
+            known = found.get(pair)
+            if known is not None and known.index < index:
+                continue
+            distance = self._distance(placed, index, a, b)
+            if distance < margin and (known is None or distance < known.distance):
+                found[pair] = Contact(index, pair, distance)
+                if enough(pair):
+                    break
+        return sorted(found.values(), key=lambda contact: (contact.index, sorted(contact.pair)))
 
     def densified(self, path: np.ndarray) -> np.ndarray:
         """The path (n,7) with configurations (k,7) put in between, as close as JOINT_STEP and TRAVEL_STEP demand."""
         if len(path) < 2:
             return path
-        halves = np.insert(path[1:], np.arange(len(path) - 1), (path[1:] + path[:-1]) / 2, axis=0)
-        placed, arm = self._moving.placed(np.concatenate([path[:1], halves])), self._moving.arm
-        spread = (placed.R @ self._moving.half[arm:, :, None])[..., 0]
-        ends = np.concatenate([placed.p[:, arm:] - spread, placed.p[:, arm:] + spread], axis=1)
-        chords = np.linalg.norm(np.diff(ends, axis=0), axis=-1).max(axis=1)
-        travel = 2.2 * np.maximum(chords[::2], chords[1::2])
-        steps = np.maximum(np.abs(np.diff(path, axis=0)).max(axis=1) / JOINT_STEP, travel / TRAVEL_STEP)
-        counts = np.maximum(1, np.ceil(steps)).astype(int)
+        counts = np.maximum(1, np.ceil(self._steps(path))).astype(int)
         segment = np.repeat(np.arange(len(counts)), counts)
         number = np.arange(len(segment)) - np.repeat(np.cumsum(counts) - counts, counts) + 1
         between = path[segment] + (path[segment + 1] - path[segment]) * (number / counts[segment])[:, None]
         return np.concatenate([path[:1], between])
 
+    def _steps(self, path: np.ndarray) -> np.ndarray:
+        """How many steps each edge of the path needs, not rounded: (n−1,). The way of hand and held body is taken as
+        the chords of both halves of the edge, a tenth added."""
+        joints = np.abs(path[1:] - path[:-1]).max(axis=1)
+        halved = np.empty((2 * len(path) - 1, 7))
+        halved[::2], halved[1::2] = path, (path[1:] + path[:-1]) / 2
+        placed, arm = self._moving.placed(halved), self._moving.arm
+        spread = (placed.R @ self._moving.half[arm:, :, None])[..., 0]
+        ends = np.concatenate([placed.p[:, arm:] - spread, placed.p[:, arm:] + spread], axis=1)
+        chords = np.sqrt(((ends[1:] - ends[:-1]) ** 2).sum(axis=2).max(axis=1))
+        travel = 2.2 * np.maximum(chords[::2], chords[1::2])
+        return np.maximum(joints / JOINT_STEP, travel / TRAVEL_STEP)
+
     def _within_limits(self, q: np.ndarray) -> bool:
         return bool(np.all(q >= self._limits[0]) and np.all(q <= self._limits[1]))
 
-    def _contacts(self, q: np.ndarray, first_only: bool) -> list[Contact]:
-        self.checks += len(q)
-        placed = self._moving.placed(q)
-        found: dict[Pair, Contact] = {}
-        for index, margin, first, second in self._candidates(placed):
-            pair = frozenset((first[0].name, second[0].name))
-            known = found.get(pair)
-            if known is not None and known.index < index:
-                continue
-            distance = self._distance(first, second)
-            if distance < margin and (known is None or distance < known.distance):
-                found[pair] = Contact(index, pair, distance)
-                if first_only:
-                    break
-        return list(found.values())
+    def _candidates(self, placed: _Placed) -> Iterator[tuple[int, int, int, float]]:
+        """What is near by world bounds: index, the two solids' numbers, and their margin."""
+        fixed, out, own = self._fixed, self._outward, self._inward
+        lower, upper, moving = placed.lower, placed.upper, placed.p.shape[1]
+        for index, k in near_pairs(lower, upper, fixed.lower, fixed.upper, out.a, out.b, out.margin).tolist():
+            yield index, int(out.a[k]), moving + int(out.b[k]), float(out.margin[k])
+        for index, k in near_pairs(lower, upper, lower, upper, own.a, own.b, own.margin).tolist():
+            yield index, int(own.a[k]), int(own.b[k]), float(own.margin[k])
 
-    def _candidates(self, placed: _Placed) -> Iterator[tuple[int, float, _Posed, _Posed]]:
-        """What is near by world bounds: index, margin, and the two solids where they are."""
-        for index, a, b, margin in _near(placed, self._fixed.lower[None], self._fixed.upper[None], self._outward):
-            yield index, margin, self._at(placed, index, a), (self._fixed.solids[b], self._fixed.transforms[b])
-        for index, a, b, margin in _near(placed, placed.lower, placed.upper, self._inward):
-            yield index, margin, self._at(placed, index, a), self._at(placed, index, b)
-
-    def _at(self, placed: _Placed, index: int, k: int) -> _Posed:
-        rider = k - self._moving.arm
-        R = np.eye(3) if rider < 0 else placed.R[index, rider]
-        return self._moving.solids[k], coal.Transform3s(R, placed.p[index, k])
-
-    def _distance(self, first: _Posed, second: _Posed) -> float:
+    def _distance(self, placed: _Placed, index: int, a: int, b: int) -> float:
         self._result.clear()
-        return coal.distance(first[0].geometry, first[1], second[0].geometry, second[1], self._request, self._result)
+        first, second = self._solids[a].geometry, self._solids[b].geometry
+        X_a, X_b = self._transform(placed, index, a), self._transform(placed, index, b)
+        return coal.distance(first, X_a, second, X_b, self._request, self._result)
+
+    def _transform(self, placed: _Placed, index: int, k: int) -> Any:
+        moving = placed.p.shape[1]
+        if k >= moving:
+            return self._fixed.transforms[k - moving]
+        rider = k - self._moving.arm
+        return coal.Transform3s(_UNTURNED if rider < 0 else placed.R[index, rider], placed.p[index, k])
 
 
 @dataclass(frozen=True)
@@ -194,21 +204,6 @@ class _Pairs:
     margin: np.ndarray
 
 
-def _near(placed: _Placed, lower: np.ndarray, upper: np.ndarray, pairs: _Pairs) -> list[tuple[int, int, int, float]]:
-    """(index, a, b, margin) wherever the world bounds of moving solid a and of b, lower, upper (n or 1,…,3), come
-    nearer than the margin, sorted by index."""
-    a, b, margin = pairs.a, pairs.b, pairs.margin[:, None]
-    below, above = placed.lower.min(axis=0), placed.upper.max(axis=0)
-    far = (below[a] - margin >= upper.max(axis=0)[b]) | (above[a] + margin <= lower.min(axis=0)[b])
-    kept = np.flatnonzero(~far.any(axis=1))
-    a, b, margin = a[kept], b[kept], pairs.margin[kept]
-    apart = np.zeros((len(placed.p), len(kept)), dtype=bool)
-    for axis in range(3):
-        apart |= placed.lower[:, a, axis] - margin >= upper[:, b, axis]
-        apart |= placed.upper[:, a, axis] + margin <= lower[:, b, axis]
-    return [(int(i), int(a[k]), int(b[k]), float(margin[k])) for i, k in np.argwhere(~apart)]
-
-
 def _outward_pairs(
     parts: tuple[str, ...], names: list[str], link: np.ndarray, fixed: list[_Solid], margins: Margins
 ) -> _Pairs:
@@ -217,23 +212,27 @@ def _outward_pairs(
     table = margins.table(parts, [solid.name for solid in fixed])[rows]
     table[link == 0] = -np.inf
     a, b = np.nonzero(table > -np.inf)
-    return _Pairs(a, b, table[a, b])
+    return _Pairs(np.ascontiguousarray(a), np.ascontiguousarray(b), table[a, b])
 
 
 def _inward_pairs(parts: tuple[str, ...], names: tuple[str, ...], margins: Margins) -> _Pairs:
     """The robot's own solids against each other."""
-    pairs = [(outer, inner, margins.within_robot(outer, inner)) for outer, inner in self_collision_pairs(parts)]
-    found = [
-        (a, b, margin) for outer, inner, margin in pairs if margin > -np.inf for a, b in _numbers(names, outer, inner)
-    ]
-    a, b, margin = zip(*found, strict=True)
-    return _Pairs(np.array(a), np.array(b), np.array(margin))
+    pairs, rows, a, b = _inward_numbers(parts, names)
+    margin = np.array([margins.within_robot(*pair) for pair in pairs])[rows]
+    kept = margin > -np.inf
+    return _Pairs(a[kept], b[kept], margin[kept])
 
 
-@lru_cache(maxsize=1024)
-def _numbers(names: tuple[str, ...], first: str, second: str) -> tuple[tuple[int, int], ...]:
-    inner = [k for k, name in enumerate(names) if name == second]
-    return tuple((a, b) for a, name in enumerate(names) if name == first for b in inner)
+@lru_cache(maxsize=64)
+def _inward_numbers(
+    parts: tuple[str, ...], names: tuple[str, ...]
+) -> tuple[list[tuple[str, str]], np.ndarray, np.ndarray, np.ndarray]:
+    """The pairs of parts, and for each pair of their solids: its pair's row, and the two numbers."""
+    pairs = self_collision_pairs(parts)
+    solids = {part: [k for k, name in enumerate(names) if name == part] for part in parts}
+    found = [(row, a, b) for row, (first, second) in enumerate(pairs) for a in solids[first] for b in solids[second]]
+    rows, a, b = (np.array(column) for column in zip(*found, strict=True))
+    return pairs, rows, a, b
 
 
 @lru_cache(maxsize=64)

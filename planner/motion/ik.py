@@ -7,7 +7,6 @@ half a turn on, second negated, third half a turn on) in which every link stands
 own axis, hence eight branches.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -43,17 +42,18 @@ class ClosedFormIK:
 
     def ik(self, X_WG: SE3, swivels: np.ndarray = SWIVELS) -> np.ndarray:
         """Configurations (n,7) within the joint limits at the given swivel angles (rad), largest margin first."""
-        wrist = self.wrist_poses([X_WG])
+        wrist = self.wrist_poses(X_WG.rotation[None], X_WG.translation[None])
         margins = self.margins(wrist, swivels)[0]
         order = np.argsort(-margins, axis=None, kind="stable")[: int(np.count_nonzero(margins >= 0.0))]
         chosen, branches = np.unravel_index(order, margins.shape)
         repeated = WristPoses(np.repeat(wrist.R, len(order), axis=0), np.repeat(wrist.p, len(order), axis=0))
         return self.follow(repeated, np.asarray(swivels)[chosen], branches)
 
-    def wrist_poses(self, poses: Sequence[SE3]) -> WristPoses:
-        """Wrist poses for gripper poses X_WG."""
-        wrists = [self._X_BW * X_WG * self._X_Gw for X_WG in poses]
-        return WristPoses(np.array([X.rotation for X in wrists]), np.array([X.translation for X in wrists]))
+    def wrist_poses(self, R_WG: np.ndarray, p_WG: np.ndarray) -> WristPoses:
+        """Wrist poses for gripper poses: rotations R_WG (k,3,3) and positions p_WG (k,3)."""
+        R_BW, R_BG = self._X_BW.rotation, self._X_BW.rotation @ R_WG
+        p_BG = p_WG @ R_BW.T + self._X_BW.translation
+        return WristPoses(R_BG @ self._X_Gw.rotation, p_BG + R_BG @ self._X_Gw.translation)
 
     def margins(self, wrists: WristPoses, swivels: np.ndarray) -> np.ndarray:
         """Distance in rad from the nearest joint limit, negative beyond it, −inf out of reach: (k, s, 8) for k poses,

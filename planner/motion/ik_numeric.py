@@ -10,10 +10,8 @@ from collections.abc import Iterable
 
 import numpy as np
 import pinocchio as pin
-import qpsolvers
 from pinocchio import SE3
-from scipy.sparse import csc_matrix
-
+from planner.motion.lines import MAX_JOINT_STEP, CartesianPath
 from sim.robot import RobotModel
 
 TOLERANCE = 1e-6
@@ -46,7 +44,22 @@ def solve_numerically(robot: RobotModel, X_WG: SE3, starts: Iterable[np.ndarray]
     return None
 
 
+def track_numerically(robot: RobotModel, path: CartesianPath, start: np.ndarray) -> np.ndarray | None:
+    """A joint path (n,7) through all poses going on from `start` (7,), or None if the arm gets stuck or must jump."""
+    found = [np.array(start, dtype=float)]
+    for R_WG, p_WG in zip(path.R_WG, path.p_WG, strict=True):
+        q = solve_numerically(robot, SE3(R_WG, p_WG), [found[-1]])
+        if q is None or np.abs(q - found[-1]).max() > MAX_JOINT_STEP:
+            return None
+        found.append(q)
+    return np.array(found[1:])
+
+
 def _step(robot: RobotModel, q: np.ndarray, jacobian: np.ndarray, error: np.ndarray) -> np.ndarray | None:
+    # Half a second of imports, and few programs come here.
+    import qpsolvers
+    from scipy.sparse import csc_matrix
+
     damping = _DAMPING * float(error @ error) + _FLOOR
     with warnings.catch_warnings():
         # A step that the solver calls inaccurate comes back as None; the next start is tried.

@@ -8,8 +8,8 @@ facing each other may be rejected that are apart by a little more. A cylinder ag
 cylinder may be rejected half a millimetre too early on average, rarely a centimetre, where its rim faces an
 edge. Never is a pair accepted that is nearer than its margin.
 
-Everything travels in few, flat tables, because a compiled call pays for every array it is handed.
-Placements are 12 numbers: the rotation row by row, then the origin.
+Everything travels in few, flat tables, because a compiled call pays for every array it is handed. For
+placements see `chain`.
 """
 
 from typing import NamedTuple
@@ -32,11 +32,11 @@ OBSTACLE_COLUMNS = 24
 class ArmArrays(NamedTuple):
     """The robot as tables.
 
-    joints (7,12): placement of each joint (revolute about z) in the previous link, the first in W.
-    base (12,): placement of link 0 in W. limits (2,7): lowest and highest position.
+    joints (7,12): placement of each joint (revolute about z) in the previous link. base (12,): placement
+    of link 0 in W. limits (2,7): lowest and highest position.
     spheres (n,4): centre in the link's frame and radius; link i has rows first[i]:first[i+1].
     covers (8,4): a sphere around each link's spheres. solids (m,18): hand, fingers and held body in
-    link 7. probes (k,3): points in link 7 whose travel along an edge is bounded.
+    link 7. probes (k,4): points in link 7 whose travel along an edge is bounded, as spheres without radius.
     """
 
     joints: np.ndarray
@@ -63,65 +63,76 @@ class SceneArrays(NamedTuple):
 
 
 @njit(cache=True)
-def _compose(a, i, b, j, out, k):
-    """out[k] = a[i] ∘ b[j], rows of placements."""
-    for r in range(3):
-        x, y, z = a[i, 3 * r], a[i, 3 * r + 1], a[i, 3 * r + 2]
-        for c in range(3):
-            out[k, 3 * r + c] = x * b[j, c] + y * b[j, 3 + c] + z * b[j, 6 + c]
-        out[k, 9 + r] = a[i, 9 + r] + x * b[j, 9] + y * b[j, 10] + z * b[j, 11]
-
-
-@njit(cache=True)
 def place_links(q, base, joints, links):
     """Write the placements of links 0 to 7 in W, links (8,12), at q (7,)."""
     for i in range(12):
         links[0, i] = base[i]
-        links[1, i] = joints[0, i]
     for k in range(7):
-        if k > 0:
-            _compose(links, k, joints, k, links, k + 1)
         c, s = np.cos(q[k]), np.sin(q[k])
         for r in range(3):
-            x, y = links[k + 1, 3 * r], links[k + 1, 3 * r + 1]
-            links[k + 1, 3 * r] = c * x + s * y
-            links[k + 1, 3 * r + 1] = c * y - s * x
+            x, y, z = links[k, 3 * r], links[k, 3 * r + 1], links[k, 3 * r + 2]
+            along = x * joints[k, 0] + y * joints[k, 3] + z * joints[k, 6]
+            across = x * joints[k, 1] + y * joints[k, 4] + z * joints[k, 7]
+            links[k + 1, 3 * r] = c * along + s * across
+            links[k + 1, 3 * r + 1] = c * across - s * along
+            links[k + 1, 3 * r + 2] = x * joints[k, 2] + y * joints[k, 5] + z * joints[k, 8]
+            links[k + 1, 9 + r] = links[k, 9 + r] + x * joints[k, 9] + y * joints[k, 10] + z * joints[k, 11]
 
 
 @njit(cache=True)
-def _place_points(links, row, points, start, stop, out):
-    """out[i, :3] = points[i, :3], given in the frame of links[row], in W."""
+def place_all_links(q, base, joints):
+    """Placements (n,8,12) of links 0 to 7 in W at q (n,7)."""
+    links = np.empty((q.shape[0], 8, 12))
+    for k in range(q.shape[0]):
+        place_links(q[k], base, joints, links[k])
+    return links
+
+
+@njit(cache=True)
+def _place_spheres(links, row, spheres, start, stop, placed):
+    """Write `placed`: the spheres (n,4) from start to stop, given in the frame of links[row], in W."""
     for i in range(start, stop):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
         for r in range(3):
-            out[i, r] = (
-                links[row, 9 + r] + links[row, 3 * r] * x + links[row, 3 * r + 1] * y + links[row, 3 * r + 2] * z
-            )
+            turned = links[row, 3 * r] * spheres[i, 0] + links[row, 3 * r + 1] * spheres[i, 1]
+            placed[i, r] = links[row, 9 + r] + turned + links[row, 3 * r + 2] * spheres[i, 2]
+        placed[i, 3] = spheres[i, 3]
 
 
 @njit(cache=True)
-def _distance_in_frame(x, y, z, solids, k):
-    """Distance of a point, in the frame of solid k, from that solid (0 inside)."""
-    kind = solids[k, KIND]
-    if kind == SPHERE:
-        return max(0.0, np.sqrt(x * x + y * y + z * z) - solids[k, HALF])
-    dz = max(0.0, abs(z) - solids[k, HALF + 2])
-    if kind == CYLINDER:
-        dr = max(0.0, np.sqrt(x * x + y * y) - solids[k, HALF])
-        return np.sqrt(dr * dr + dz * dz)
-    dx = max(0.0, abs(x) - solids[k, HALF])
-    dy = max(0.0, abs(y) - solids[k, HALF + 1])
-    return np.sqrt(dx * dx + dy * dy + dz * dz)
+def _place_solids(links, row, solids, placed):
+    """Write `placed` (m,24): the solids (m,18), given in the frame of links[row], in W, with their world bounds."""
+    for s in range(solids.shape[0]):
+        for i in range(PLACE):
+            placed[s, i] = solids[s, i]
+        for r in range(3):
+            x, y, z = links[row, 3 * r], links[row, 3 * r + 1], links[row, 3 * r + 2]
+            reach = 0.0
+            for c in range(3):
+                entry = x * solids[s, PLACE + c] + y * solids[s, PLACE + 3 + c] + z * solids[s, PLACE + 6 + c]
+                placed[s, PLACE + 3 * r + c] = entry
+                reach += abs(entry) * solids[s, HALF + c]
+            offset = x * solids[s, PLACE + 9] + y * solids[s, PLACE + 10] + z * solids[s, PLACE + 11]
+            centre = links[row, 9 + r] + offset
+            placed[s, PLACE + 9 + r] = centre
+            placed[s, LOWER + r] = centre - reach
+            placed[s, UPPER + r] = centre + reach
 
 
 @njit(cache=True)
 def _distance(dx, dy, dz, solids, k):
-    """Distance from solid k of a point that is d away from its centre."""
+    """Distance from solid k of a point that is d away from its centre (0 inside)."""
     R = PLACE
     x = solids[k, R] * dx + solids[k, R + 3] * dy + solids[k, R + 6] * dz
     y = solids[k, R + 1] * dx + solids[k, R + 4] * dy + solids[k, R + 7] * dz
     z = solids[k, R + 2] * dx + solids[k, R + 5] * dy + solids[k, R + 8] * dz
-    return _distance_in_frame(x, y, z, solids, k)
+    if solids[k, KIND] == SPHERE:
+        return max(0.0, np.sqrt(x * x + y * y + z * z) - solids[k, HALF])
+    z = max(0.0, abs(z) - solids[k, HALF + 2])
+    if solids[k, KIND] == CYLINDER:
+        x, y = max(0.0, np.sqrt(x * x + y * y) - solids[k, HALF]), 0.0
+    else:
+        x, y = max(0.0, abs(x) - solids[k, HALF]), max(0.0, abs(y) - solids[k, HALF + 1])
+    return np.sqrt(x * x + y * y + z * z)
 
 
 @njit(cache=True)
@@ -138,11 +149,12 @@ def _out_of_bounds(x, y, z, reach, obstacles, k):
 
 
 @njit(cache=True)
-def _boxes_apart(solids, s, reach, margin, obstacles, k):
-    """Are the world bounds of solid s (`reach`: their half extents) and of obstacle k apart?"""
+def _bounds_apart(solids, s, obstacles, k, margin):
+    """Are the world bounds of placed solid s and of obstacle k further apart than the margin?"""
     for i in range(3):
-        centre, half = solids[s, PLACE + 9 + i], reach[i] + margin
-        if centre + half < obstacles[k, LOWER + i] or centre - half > obstacles[k, UPPER + i]:
+        if solids[s, LOWER + i] - margin > obstacles[k, UPPER + i]:
+            return True
+        if solids[s, UPPER + i] + margin < obstacles[k, LOWER + i]:
             return True
     return False
 
@@ -233,38 +245,31 @@ def _solid_hits(solids, s, obstacles, k, margin):
 
 
 @njit(cache=True)
-def _hand_hits(solids, obstacles, margins, hits, first_only):
-    """Mark in hits (n,) the obstacles that the placed solids come too near to. With first_only, stop at one: True."""
-    reach = np.empty(3)
+def _hand_hits(solids, obstacles, k, margins):
+    """Does any of the placed solids come too near to obstacle k?"""
     for s in range(solids.shape[0]):
-        part = int(solids[s, PART])
-        reach[0] = _half_width(1.0, 0.0, 0.0, solids, s)
-        reach[1] = _half_width(0.0, 1.0, 0.0, solids, s)
-        reach[2] = _half_width(0.0, 0.0, 1.0, solids, s)
-        for k in range(obstacles.shape[0]):
-            margin = margins[part, k]
-            if margin == -np.inf or _boxes_apart(solids, s, reach, margin, obstacles, k):
-                continue
-            if _solid_hits(solids, s, obstacles, k, margin):
-                hits[k] = True
-                if first_only:
-                    return True
+        margin = margins[int(solids[s, PART]), k]
+        if margin == -np.inf or _bounds_apart(solids, s, obstacles, k, margin):
+            continue
+        if _solid_hits(solids, s, obstacles, k, margin):
+            return True
     return False
 
 
 @njit(cache=True)
-def hand_contacts(link, solids, obstacles, margins):
-    """Which obstacles do the solids, riding on a link placed at `link` (12,), come too near to? (n,) of bool."""
-    placed, hits = solids.copy(), np.zeros(obstacles.shape[0], dtype=np.bool_)
-    for s in range(solids.shape[0]):
-        _compose(link.reshape(1, 12), 0, solids[:, PLACE : PLACE + 12], s, placed[:, PLACE : PLACE + 12], s)
-    _hand_hits(placed, obstacles, margins, hits, False)
+def hand_contacts(links, solids, obstacles, margins):
+    """Which obstacles do the solids, riding on a link placed at links[0] (1,12), come too near to? (n,) of bool."""
+    placed = np.empty((solids.shape[0], OBSTACLE_COLUMNS))
+    _place_solids(links, 0, solids, placed)
+    hits = np.empty(obstacles.shape[0], dtype=np.bool_)
+    for k in range(obstacles.shape[0]):
+        hits[k] = _hand_hits(placed, obstacles, k, margins)
     return hits
 
 
 @njit(cache=True)
-def _links_hit(covers, spheres, radii, first, obstacles, margins):
-    """Do the spheres (n,3) of links 1 to 7, or only the covers around them, hit something?"""
+def _links_hit(covers, spheres, first, obstacles, margins):
+    """Do the placed spheres of links 1 to 7 come too near to something?"""
     for link in range(1, 8):
         x, y, z, cover = covers[link, 0], covers[link, 1], covers[link, 2], covers[link, 3]
         for k in range(obstacles.shape[0]):
@@ -272,41 +277,38 @@ def _links_hit(covers, spheres, radii, first, obstacles, margins):
             if margin == -np.inf or _out_of_bounds(x, y, z, cover + margin, obstacles, k):
                 continue
             for s in range(first[link], first[link + 1]):
-                if _sphere_hits(spheres[s, 0], spheres[s, 1], spheres[s, 2], radii[s, 3] + margin, obstacles, k):
+                if _sphere_hits(spheres[s, 0], spheres[s, 1], spheres[s, 2], spheres[s, 3] + margin, obstacles, k):
                     return True
     return False
 
 
 @njit(cache=True)
-def _covers_meet(covers, a, b, margin):
-    dx, dy, dz = covers[a, 0] - covers[b, 0], covers[a, 1] - covers[b, 1], covers[a, 2] - covers[b, 2]
-    reach = covers[a, 3] + covers[b, 3] + margin
+def _spheres_meet(spheres, s, others, t, margin):
+    dx, dy, dz = spheres[s, 0] - others[t, 0], spheres[s, 1] - others[t, 1], spheres[s, 2] - others[t, 2]
+    reach = spheres[s, 3] + others[t, 3] + margin
     return dx * dx + dy * dy + dz * dz < reach * reach
 
 
 @njit(cache=True)
-def _links_meet(covers, spheres, radii, first, pairs):
+def _links_meet(covers, spheres, first, pairs):
     for n in range(pairs.shape[0]):
-        a, b = int(pairs[n, 0]), int(pairs[n, 1])
-        if not _covers_meet(covers, a, b, pairs[n, 2]):
+        a, b, margin = int(pairs[n, 0]), int(pairs[n, 1]), pairs[n, 2]
+        if not _spheres_meet(covers, a, covers, b, margin):
             continue
         for s in range(first[a], first[a + 1]):
             for t in range(first[b], first[b + 1]):
-                dx, dy = spheres[s, 0] - spheres[t, 0], spheres[s, 1] - spheres[t, 1]
-                dz = spheres[s, 2] - spheres[t, 2]
-                reach = radii[s, 3] + radii[t, 3] + pairs[n, 2]
-                if dx * dx + dy * dy + dz * dz < reach * reach:
+                if _spheres_meet(spheres, s, spheres, t, margin):
                     return True
     return False
 
 
 @njit(cache=True)
-def _hand_meets_arm(solids, spheres, radii, first, pairs):
+def _hand_meets_arm(solids, spheres, first, pairs):
     p = PLACE + 9
     for n in range(pairs.shape[0]):
         s, link = int(pairs[n, 0]), int(pairs[n, 1])
         for t in range(first[link], first[link + 1]):
-            reach = radii[t, 3] + pairs[n, 2]
+            reach = spheres[t, 3] + pairs[n, 2]
             dx, dy = spheres[t, 0] - solids[s, p], spheres[t, 1] - solids[s, p + 1]
             dz = spheres[t, 2] - solids[s, p + 2]
             if dx * dx + dy * dy + dz * dz > (reach + solids[s, BOUND]) ** 2:
@@ -317,21 +319,21 @@ def _hand_meets_arm(solids, spheres, radii, first, pairs):
 
 
 @njit(cache=True)
-def _is_free(q, arm, scene, links, centres, covers, solids, hits):
-    """The check itself; the last five are workspaces (solids: a copy of arm.solids, placed in W here)."""
+def _is_free(q, arm, scene, links, spheres, covers, solids):
+    """The check itself; the last four are workspaces."""
     place_links(q, arm.base, arm.joints, links)
-    for s in range(solids.shape[0]):
-        _compose(links, 7, arm.solids[:, PLACE : PLACE + 12], s, solids[:, PLACE : PLACE + 12], s)
-    if _hand_hits(solids, scene.obstacles, scene.margins, hits, True):
-        return False
+    _place_solids(links, 7, arm.solids, solids)
+    for k in range(scene.obstacles.shape[0]):
+        if _hand_hits(solids, scene.obstacles, k, scene.margins):
+            return False
     for link in range(8):
-        _place_points(links, link, arm.spheres, arm.first[link], arm.first[link + 1], centres)
-        _place_points(links, link, arm.covers, link, link + 1, covers)
-    if _links_hit(covers, centres, arm.spheres, arm.first, scene.obstacles, scene.margins):
+        _place_spheres(links, link, arm.spheres, arm.first[link], arm.first[link + 1], spheres)
+        _place_spheres(links, link, arm.covers, link, link + 1, covers)
+    if _links_hit(covers, spheres, arm.first, scene.obstacles, scene.margins):
         return False
-    if _links_meet(covers, centres, arm.spheres, arm.first, scene.link_pairs):
+    if _links_meet(covers, spheres, arm.first, scene.link_pairs):
         return False
-    return not _hand_meets_arm(solids, centres, arm.spheres, arm.first, scene.solid_pairs)
+    return not _hand_meets_arm(solids, spheres, arm.first, scene.solid_pairs)
 
 
 @njit(cache=True)
@@ -348,11 +350,11 @@ def _edge_steps(qa, qb, arm, links, q, joint_step, travel_step):
     for k in range(7):
         widest = max(widest, abs(qb[k] - qa[k]))
     n = arm.probes.shape[0]
-    places = np.empty((3, n, 3))
+    places = np.empty((3, n, 4))
     for half in range(3):
         _between(qa, qb, half / 2, q)
         place_links(q, arm.base, arm.joints, links)
-        _place_points(links, 7, arm.probes, 0, n, places[half])
+        _place_spheres(links, 7, arm.probes, 0, n, places[half])
     travel = 0.0
     for half in range(2):
         for m in range(n):
@@ -376,10 +378,11 @@ def edge_is_free(qa, qb, joint_step, travel_step, *tables):
     for k in range(7):
         if not (arm.limits[0, k] <= qb[k] <= arm.limits[1, k]):
             return False, 1
-    links, centres, q = np.empty((8, 12)), np.empty((arm.spheres.shape[0], 3)), np.empty(7)
-    covers, solids, hits = arm.covers.copy(), arm.solids.copy(), np.zeros(scene.obstacles.shape[0], dtype=np.bool_)
+    links, q = np.empty((8, 12)), np.empty(7)
+    spheres, covers = np.empty((arm.spheres.shape[0], 4)), np.empty((8, 4))
+    solids = np.empty((arm.solids.shape[0], OBSTACLE_COLUMNS))
     count = _edge_steps(qa, qb, arm, links, q, joint_step, travel_step)
-    if not _is_free(qb, arm, scene, links, centres, covers, solids, hits):
+    if not _is_free(qb, arm, scene, links, spheres, covers, solids):
         return False, 1
     checks = 1
     stride = 1
@@ -389,7 +392,7 @@ def edge_is_free(qa, qb, joint_step, travel_step, *tables):
         for i in range(stride, count, 2 * stride):
             checks += 1
             _between(qa, qb, i / count, q)
-            if not _is_free(q, arm, scene, links, centres, covers, solids, hits):
+            if not _is_free(q, arm, scene, links, spheres, covers, solids):
                 return False, checks
         stride //= 2
     return True, checks

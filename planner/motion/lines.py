@@ -47,32 +47,42 @@ _COARSE = 4
 
 @dataclass(frozen=True)
 class CartesianPath:
-    """Poses X_WG along a polyline; `corners` are the indices of the waypoints it was made of.
+    """Poses of the gripper along a polyline; `corners` are the indices of the waypoints it was made of.
 
-    progress (n,): how far along each pose is, from 0 to 1, a turn counted at the rate of TURN to STEP.
+    R_WG (n,3,3), p_WG (n,3). progress (n,): how far along each pose is, from 0 to 1, a turn counted at
+    the rate of TURN to STEP.
     """
 
-    poses: tuple[SE3, ...]
+    R_WG: np.ndarray
+    p_WG: np.ndarray
     corners: tuple[int, ...]
     progress: np.ndarray
 
 
 def interpolate(waypoints: Sequence[SE3]) -> CartesianPath:
     """Poses along the polyline, at most STEP and TURN apart: positions linear, orientations at constant rate."""
-    poses, corners, way = [waypoints[0]], [0], [0.0]
+    R, p, way, corners = [waypoints[0].rotation[None]], [waypoints[0].translation[None]], [np.zeros(1)], [0]
     for X_WA, X_WB in pairwise(waypoints):
         offset = X_WB.translation - X_WA.translation
         turn = pin.log3(X_WA.rotation.T @ X_WB.rotation)
         steps = max(float(np.linalg.norm(offset)) / STEP, float(np.linalg.norm(turn)) / TURN)
-        count = max(1, int(np.ceil(steps - 1e-9)))
-        for k in range(1, count):
-            fraction = k / count
-            poses.append(SE3(X_WA.rotation @ pin.exp3(turn * fraction), X_WA.translation + offset * fraction))
-        poses.append(X_WB)
-        corners.append(len(poses) - 1)
-        way += [way[-1] + steps * k / count for k in range(1, count + 1)]
-    progress = np.array(way)
-    return CartesianPath(tuple(poses), tuple(corners), progress / max(way[-1], 1e-12))
+        fractions = np.linspace(0.0, 1.0, max(1, int(np.ceil(steps - 1e-9))) + 1)[1:]
+        R.append(X_WA.rotation @ _turns(turn, fractions))
+        p.append(X_WA.translation + offset * fractions[:, None])
+        way.append(way[-1][-1] + steps * fractions)
+        corners.append(corners[-1] + len(fractions))
+    progress = np.concatenate(way)
+    return CartesianPath(
+        np.concatenate(R), np.concatenate(p), tuple(corners), progress / max(float(progress[-1]), 1e-12)
+    )
+
+
+def _turns(turn: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+    """Rotation matrices (n,3,3) of parts (n,) of a rotation vector (3,), by Rodrigues' formula."""
+    angle = float(np.linalg.norm(turn))
+    K = pin.skew(turn / max(angle, 1e-12))
+    angles = (angle * fractions)[:, None, None]
+    return np.eye(3) + np.sin(angles) * K + (1.0 - np.cos(angles)) * (K @ K)
 
 
 def track(
@@ -85,8 +95,8 @@ def track(
     is no better); among equals postures that differ, then those soon reached from `near` (7,) at
     joint speeds `speed` (7,) and with the elbow high. None at all: the line can't be followed.
     """
-    wrists = ik.wrist_poses(path.poses)
-    coarse = np.unique([*range(0, len(path.poses), _COARSE), *path.corners])
+    wrists = ik.wrist_poses(path.R_WG, path.p_WG)
+    coarse = np.unique([*range(0, len(path.p_WG), _COARSE), *path.corners])
     margins = ik.margins(WristPoses(wrists.R[coarse], wrists.p[coarse]), _GRID)
     worst = _worst_margins(margins, path.progress[coarse])
     starts, changes, branches = np.nonzero(worst >= MIN_MARGIN)

@@ -12,6 +12,7 @@ from planner.motion.checking import CollisionChecker
 from planner.motion.collision import FastChecker, hand_hits
 from planner.motion.exact import Contact, ExactChecker
 from planner.motion.ik import ClosedFormIK
+from planner.motion.ik_numeric import track_numerically
 from planner.motion.lines import CartesianPath, interpolate, track
 from planner.motion.ompl_ import PathSettings, Query, plan_path
 from planner.motion.shortcut import shortened
@@ -105,6 +106,15 @@ class MotionPlanner:
         cuts = list(zip(path.corners[:-1], path.corners[1:], strict=True))
         return [[q[a : b + 1] for a, b in cuts] for q in self._track(path, near)]
 
+    def line_from(self, q: np.ndarray, waypoints: Sequence[SE3]) -> np.ndarray | None:
+        """One joint path (n,7) along the polyline of poses X_WG that goes on from q (7,), the arm being at the first.
+
+        Found step by step (see `ik_numeric`), so near limits it may fail where `lines` finds another posture.
+        """
+        path = interpolate(waypoints)
+        self.work.add("ik", len(path.p_WG))
+        return track_numerically(self.robot, path, q)
+
     def line_is_free(
         self, scene: SceneState, path: np.ndarray, allowed: frozenset[Pair] = NOTHING, margin: float | None = None
     ) -> MotionFailure | None:
@@ -134,7 +144,7 @@ class MotionPlanner:
         """
         start = trajectory.at(since)[0]
         margins = Margins(self.settings.audit_margin if margin is None else margin, allowed)
-        near = self._contacts(scene, start[None], margins)
+        near = self._near(scene, start, margins)
         left = trajectory.q[trajectory.times - trajectory.times[0] > since]
         return self._audit(scene, np.concatenate([start[None], left]), _relaxed(margins, near))
 
@@ -154,7 +164,7 @@ class MotionPlanner:
         self._queries += 1
         seed = int(np.random.SeedSequence([self._seed, self._queries]).generate_state(1)[0])
         margins = Margins(self.settings.margin, allowed)
-        near = self._contacts(scene, scene.q[None], margins)
+        near = self._near(scene, scene.q, margins)
         deep = [contact for contact in near if contact.distance < DEEPEST]
         if deep:
             return blame("the arm starts in collision:", deep, movables(scene))
@@ -172,7 +182,7 @@ class MotionPlanner:
         return MotionFailure("no timed motion along the paths found keeps clear of everything")
 
     def _track(self, path: CartesianPath, near: np.ndarray | None) -> list[np.ndarray]:
-        self.work.add("ik", len(path.poses))
+        self.work.add("ik", len(path.p_WG))
         return list(track(self._ik, path, self.robot.v_max, near))
 
     def _free_goals(
@@ -240,11 +250,17 @@ class MotionPlanner:
         contacts = self._contacts(scene, q, margins)
         return blame("the motion comes too near:", contacts, movables(scene)) if contacts else None
 
+    def _near(self, scene: SceneState, q: np.ndarray, margins: Margins) -> list[Contact]:
+        """Everything that is nearer than its margin at q (7,)."""
+        self.work.add("exact_checks")
+        return self._exact(scene, margins).contacts(q[None])
+
     def _contacts(self, scene: SceneState, path: np.ndarray, margins: Margins) -> list[Contact]:
+        """What the path (n,7) hits, up to the first thing that can't be moved aside."""
         checker = self._exact(scene, margins)
         dense = checker.densified(path)
         self.work.add("exact_checks", len(dense))
-        return checker.contacts(dense)
+        return checker.contacts(dense, enough=movables(scene).isdisjoint)
 
     def _exact(self, scene: SceneState, margins: Margins) -> ExactChecker:
         for known, limits, checker in self._recent:

@@ -5,8 +5,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pinocchio import SE3
 
-from planner.motion.chain import place_links
-from planner.motion.ik import SWIVELS, ClosedFormIK
+from planner.motion.chain import place_links, placement
+from planner.motion.ik import SWIVELS, ClosedFormIK, WristPoses
 from planner.motion.ik_numeric import solve_numerically
 from sim.robot import RobotModel
 
@@ -16,6 +16,11 @@ IK = ClosedFormIK(ROBOT)
 configurations = st.tuples(*(st.floats(low, high) for low, high in zip(ROBOT.q_min, ROBOT.q_max, strict=True))).map(
     np.array
 )
+
+
+def _wrists(X_WG: SE3, count: int) -> WristPoses:
+    """The wrist pose of one gripper pose, several times."""
+    return IK.wrist_poses(np.tile(X_WG.rotation, (count, 1, 1)), np.tile(X_WG.translation, (count, 1)))
 
 
 def _error(q: np.ndarray, X_WG: SE3) -> float:
@@ -49,7 +54,7 @@ def _swivel(q: np.ndarray) -> float:
 @given(configurations)
 def test_the_configuration_one_came_from_is_among_the_solutions(q):
     assume(min(abs(np.sin(q[1])), abs(np.sin(q[3])), abs(np.sin(q[5]))) > 0.02)
-    wrists = IK.wrist_poses([ROBOT.X_WG(q)] * 8)
+    wrists = _wrists(ROBOT.X_WG(q), 8)
     solutions = IK.follow(wrists, np.full(8, _swivel(q)), np.arange(8))
     assert np.abs(solutions - q).max(axis=1).min() < 1e-7
 
@@ -73,7 +78,7 @@ def test_solutions_come_with_the_largest_joint_margin_first():
 
 def test_the_elbow_is_uppermost_at_swivel_zero():
     X_WG = ROBOT.X_WG(np.radians([10.0, 40.0, 25.0, -80.0, 0.0, 60.0, 0.0]))
-    q = IK.follow(IK.wrist_poses([X_WG] * len(SWIVELS)), SWIVELS, np.zeros(len(SWIVELS)))
+    q = IK.follow(_wrists(X_WG, len(SWIVELS)), SWIVELS, np.zeros(len(SWIVELS)))
     up = ROBOT.X_WB.rotation[:, 2]
     heights = [float(up @ ROBOT.link_poses(x, 0.0)["link_4"].translation) for x in q]
     assert SWIVELS[int(np.argmax(heights))] == pytest.approx(0.0, abs=1e-12)
@@ -104,9 +109,8 @@ def test_the_numeric_solver_says_none_out_of_reach_and_warns_of_nothing():
 
 def test_batched_kinematics_agree_with_the_robot_model():
     q = np.random.default_rng(0).uniform(ROBOT.q_min, ROBOT.q_max, (5, 7))
-    R, p = place_links(ROBOT, q)
+    links = place_links(ROBOT, q)
     for k in range(5):
         poses = ROBOT.link_poses(q[k], 0.0)
         for link in range(8):
-            assert np.allclose(R[k, link], poses[f"link_{link}"].rotation, atol=1e-12)
-            assert np.allclose(p[k, link], poses[f"link_{link}"].translation, atol=1e-12)
+            assert np.allclose(links[k, link], placement(poses[f"link_{link}"]), atol=1e-12)
