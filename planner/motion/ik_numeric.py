@@ -11,6 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 import pinocchio as pin
 from pinocchio import SE3
+
 from planner.motion.lines import MAX_JOINT_STEP, CartesianPath
 from sim.robot import RobotModel
 
