@@ -23,13 +23,17 @@ LOST_AFTER = 0.014
 LOST_AFTER_TOUCH = 0.25
 """The same while touching down, when the tool may bounce."""
 
+GUARDED_DAMPING = 40.0
+"""Velocity gain in 1/s on the way to contact: low, for what a hard surface does to the velocity
+comes back as torque at once."""
+
 PRESSED_SETTLING = 0.1
 """Seconds that the force is left to settle after it was ramped up."""
 
 AT_REST = 0.02
 """Joint speed in rad/s below which the arm counts as at rest."""
 
-ARRIVED = 0.01
+ARRIVED = 0.03
 """Joint error in rad below which position mode counts as arrived."""
 
 
@@ -99,6 +103,7 @@ class ArmController:
     def tare(self) -> None:
         """Take what the wrist sensor feels for its error. In the air, nearly still, before each touch."""
         self._wrench.tare()
+        self._touch = Touch(self._period)
 
     @property
     def reference(self) -> Reference | None:
@@ -230,8 +235,10 @@ class ArmController:
         """The tasks of this instant, and the wrench (6,) on the tool, in W, that they rely on."""
         reference = self._reference
         joints = self._course.now()
-        if reference is None or reference.mode == "position" or (reference.mode == "hybrid" and not self._pressed):
+        if reference is None or reference.mode == "position":
             return [JointTask(*joints)], _NO_WRENCH
+        if reference.mode == "hybrid" and not self._pressed:
+            return [JointTask(*joints, damping=GUARDED_DAMPING)], _NO_WRENCH
         target = target_at(self._robot, self._data, *joints)
         posture = PostureTask(*joints)
         normal = reference.normal

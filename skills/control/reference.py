@@ -18,8 +18,9 @@ class Reference:
     """A trajectory and the law by which the arm follows it.
 
     mode "position": stiffly, in joint space. "impedance": the tool as a mass, spring and damper with
-    `stiffness` (6,) (N/m and Nm/rad, linear first, along W's axes). "hybrid": stiffly in all directions
-    of the contact frame C but its z, along which the measured force is regulated.
+    `stiffness` (6,) (N/m and Nm/rad, linear first, along W's axes; the other modes make no use of
+    it). "hybrid": stiffly in all directions of the contact frame C but its z, along which the
+    measured force is regulated.
 
     force: N to press with along −z of C (0: none). Impedance shifts its set-point below the touched
     surface by force over stiffness, without measuring what comes of it.

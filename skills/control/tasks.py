@@ -56,9 +56,10 @@ class JointTask:
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
+    damping: float = JOINT_DAMPED
 
     def rows(self, state: ArmState) -> Rows:
-        return Rows(_EYE, self.a + JOINT_DAMPED * (self.v - state.v) + JOINT_STIFF * (self.q - state.q))
+        return Rows(_EYE, self.a + self.damping * (self.v - state.v) + JOINT_STIFF * (self.q - state.q))
 
 
 @dataclass(frozen=True, slots=True)

@@ -80,6 +80,18 @@ class Rig:
         return sum(c.normal_force for c in self.plant.contacts() if {c.first, c.second} == {name, "table"})
 
 
+class Steps:
+    """The largest change of a torque between two ticks that were watched, in Nm."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig, self._last = rig, rig.tau.copy()
+        self.largest = 0.0
+
+    def __call__(self, _: Observation) -> None:
+        self.largest = max(self.largest, float(np.abs(self._rig.tau - self._last).max()))
+        self._last = self._rig.tau.copy()
+
+
 class Lab:
     """Makes rigs, poses and trajectories."""
 
@@ -100,6 +112,10 @@ class Lab:
     def rig(self, q0: np.ndarray, bodies: tuple[Body, ...] = (), grip: GripCommand = IDLE) -> Rig:
         self._rigs.append(Rig(self.robot, q0, bodies, grip))
         return self._rigs[-1]
+
+    @staticmethod
+    def steps(rig: Rig) -> Steps:
+        return Steps(rig)
 
     def close(self) -> None:
         for rig in self._rigs:

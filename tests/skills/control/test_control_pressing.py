@@ -55,8 +55,11 @@ def test_contact_lost_at_an_edge_is_noticed_within_50_ms_and_the_arm_holds(lab):
     rig = lab.rig(q0, grip=GripCommand(-0.3, 20.0))
     rig.run(0.3)
     rig.controller.tare()
-    rig.follow(Reference(lab.straight(q0, [0.0, 0.0, -0.015], 0.02), "hybrid", force=5.0, until_contact=True))
+    steps = lab.steps(rig)
+    lower = lab.straight(q0, [0.0, 0.0, -0.015], 0.02)
+    rig.follow(Reference(lower, "hybrid", force=5.0, until_contact=True), steps)
     assert rig.controller.contact
+    assert steps.largest < 5.0
     over_the_edge = lab.straight(rig.q, [0.0, 0.1, 0.0], 0.1)
     rig.controller.follow(Reference(over_the_edge, "hybrid", force=5.0))
     airborne = 0
