@@ -20,7 +20,10 @@ def call(arguments: argparse.Namespace) -> int:
     options = options_of(arguments)
     scenario = scenario_of(arguments)
 
-    from bt_tamp.executive.preview import preview
+    from bt_tamp.quiet import quiet_imports
+
+    with quiet_imports():
+        from bt_tamp.executive.preview import preview
     from bt_tamp.report.events import Event
     from bt_tamp.report.result import EXIT_CODES
     from bt_tamp.report.sentences import counted, sentence

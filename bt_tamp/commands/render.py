@@ -24,7 +24,10 @@ def render(folder: Path, out: Path | None) -> Path:
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     from bt_tamp.errors import refusing
-    from bt_tamp.report.video import render_run
+    from bt_tamp.quiet import quiet_imports
+
+    with quiet_imports():
+        from bt_tamp.report.video import render_run
 
     columns = (TextColumn("rendering"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     console = Console(stderr=True)

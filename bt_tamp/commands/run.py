@@ -38,7 +38,10 @@ def call(arguments: argparse.Namespace) -> int:
     for stop in (signal.SIGINT, signal.SIGTERM):
         signal.signal(stop, signal.default_int_handler)
 
-    from bt_tamp.executive.loop import run_scenario
+    from bt_tamp.quiet import quiet_imports
+
+    with quiet_imports():
+        from bt_tamp.executive.loop import run_scenario
     from bt_tamp.report.live import watcher
     from bt_tamp.report.recorder import RunRecorder
 

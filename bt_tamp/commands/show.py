@@ -17,7 +17,10 @@ def call(arguments: argparse.Namespace) -> int:
     scenario = scenario_of(arguments)
 
     from bt_tamp.errors import refusing
-    from bt_tamp.report.video import show_scene
+    from bt_tamp.quiet import quiet_imports
+
+    with quiet_imports():
+        from bt_tamp.report.video import show_scene
     from planner.task.facts import observed_facts
     from sim.robot import RobotModel
     from sim.scene import SceneState

@@ -1,12 +1,117 @@
-"""Run scenes over many seeds in parallel; every result is stored as it arrives, a table closes."""
+"""Run scenes over many seeds in parallel: each result is stored as it arrives, a table closes.
+
+The exit code is 0 when every run has come to its end, whatever its outcome: the table tells that.
+"""
 
 import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bt_tamp.commands.choices import add_planning, add_time_limit, options_of
+
+if TYPE_CHECKING:
+    from bt_tamp.sweep import Finished, Job
+    from bt_tamp.sweep_store import SweepStore
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """None needed."""
+    """Scenes, seeds, processes, store, and what a run understands."""
+    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="shipped scenes' names or scene files")
+    parser.add_argument("--seeds", type=seeds, default=range(20), metavar="A:B", help="A up to B-1, or one seed (0:20)")
+    parser.add_argument(
+        "--jobs", type=positive, default=os.cpu_count() or 1, metavar="N", help="runs at a time (default: one a core)"
+    )
+    parser.add_argument("--store", type=Path, required=True, metavar="FILE", help="SQLite file for the results")
+    parser.add_argument(
+        "--resume", action="store_true", help="keep the runs that are stored; repeat those that crashed or were killed"
+    )
+    add_time_limit(parser)
+    add_planning(parser)
+
+
+def seeds(text: str) -> range:
+    """The seeds "A:B" (A, A+1, …, B-1) or "N"."""
+    first, colon, end = text.partition(":")
+    try:
+        found = range(int(first), int(end)) if colon else range(int(first), int(first) + 1)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected whole numbers A:B or one seed N") from None
+    if not found or found.start < 0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected 0 ≤ A < B")
+    return found
+
+
+def positive(text: str) -> int:
+    """A whole number of at least 1."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number of at least 1")
+    return int(text)
 
 
 def call(arguments: argparse.Namespace) -> int:
-    """None."""
+    """Run what isn't stored yet, then print the table."""
+    jobs = _jobs(arguments)
+
+    from rich.console import Console
+
+    from bt_tamp.errors import UserError
+    from bt_tamp.sweep_store import UNFINISHED, SweepStore
+    from bt_tamp.sweep_table import print_table
+
+    with SweepStore(arguments.store) as store:
+        stored = store.stored(jobs)
+        if stored and not arguments.resume:
+            raise UserError(f"{arguments.store}: holds {len(stored)} of these runs already; --resume goes on with it")
+        left = [job for job in jobs if job not in stored or stored[job].outcome in UNFINISHED]
+        try:
+            _run(left, arguments.jobs, store)
+        except KeyboardInterrupt:
+            print(f"bt-tamp: interrupted; what is done lies in {arguments.store}, --resume goes on", file=sys.stderr)
+            return 130
+        finally:
+            print_table(Console(), store.stored(jobs))
     return 0
+
+
+def _jobs(arguments: argparse.Namespace) -> "list[Job]":
+    from dataclasses import replace
+
+    from bt_tamp.sweep import Job
+    from scenarios.load import load_scenario
+
+    options = options_of(arguments)
+    for scene in arguments.scenes:
+        load_scenario(scene)
+    scenes = dict.fromkeys(arguments.scenes)
+    return [Job(scene, replace(options, seed=seed)) for scene in scenes for seed in arguments.seeds]
+
+
+def _run(jobs: "list[Job]", processes: int, store: "SweepStore") -> None:
+    from contextlib import closing
+
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from bt_tamp.sweep import run_jobs
+
+    console = Console(stderr=True)
+    columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    is_silent = not console.is_terminal
+    with (
+        Progress(*columns, console=console, disable=is_silent) as bar,
+        closing(run_jobs(jobs, min(processes, len(jobs)))) as arriving,
+    ):
+        task = bar.add_task("runs", total=len(jobs))
+        for number, finished in enumerate(arriving, start=1):
+            store.add(finished)
+            bar.advance(task)
+            said = f"{number}/{len(jobs)} {_said(finished)}"
+            print(said, file=sys.stderr) if is_silent else bar.console.print(said, highlight=False, markup=False)
+
+
+def _said(finished: "Finished") -> str:
+    seed, outcome = finished.job.options.seed, finished.outcome.replace("_", " ")
+    reason = "" if finished.outcome == "goal_reached" else f": {finished.reason}"
+    return f"{finished.job.scene}, seed {seed}: {outcome}{reason}"

@@ -66,7 +66,10 @@ def _planned(arguments: argparse.Namespace) -> "tuple[TreeNode | None, int]":
     options = options_of(arguments)
     scenario = scenario_of(arguments)
 
-    from bt_tamp.executive.preview import preview
+    from bt_tamp.quiet import quiet_imports
+
+    with quiet_imports():
+        from bt_tamp.executive.preview import preview
     from bt_tamp.report.result import EXIT_CODES
     from planner.search_then_sample import NoPlan
 

@@ -1,0 +1,107 @@
+"""Whole runs in parallel processes. A run that crashes, or whose process is killed, costs none of the others."""
+
+import signal
+from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
+
+from joblib.externals.loky import ProcessPoolExecutor
+from joblib.externals.loky.process_executor import BrokenProcessPool
+
+from bt_tamp.options import RunOptions
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Variables that keep a process's libraries to one thread."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: a scene by name or path, and its options, the seed among them."""
+
+    scene: str
+    options: RunOptions
+
+
+@dataclass(frozen=True)
+class Finished:
+    """What became of a job. outcome: that of the run, or "crashed" (an error in our code), "killed" (its process
+    vanished), "wrong_input". result: `result.json` as text, None unless the run came to its end."""
+
+    job: Job
+    outcome: str
+    reason: str
+    result: str | None = None
+
+
+def run_jobs(jobs: Iterable[Job], processes: int) -> Generator[Finished, None, None]:
+    """Run the jobs, so many at a time, and yield each as it comes to its end.
+
+    Every process is an executor of its own, so that one that dies can be told from its neighbours.
+    Leaving the iterator early ends the processes.
+    """
+    waiting = iter(jobs)
+    running: dict[Future, tuple[Job, ProcessPoolExecutor]] = {}
+    try:
+        for _ in range(processes):
+            _start_next(waiting, _executor(), running)
+        while running:
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                job, executor = running.pop(future)
+                finished = _harvest(job, future)
+                if finished.outcome == "killed":
+                    executor.shutdown(wait=False, kill_workers=True)
+                    executor = _executor()
+                _start_next(waiting, executor, running)
+                yield finished
+    finally:
+        for _, executor in running.values():
+            executor.shutdown(wait=False, kill_workers=True)
+
+
+def run_job(job: Job) -> Finished:
+    """Run one job in this process, without a folder. An error in our code is an outcome too."""
+    # The terminal's Ctrl-C reaches the whole group; the parent decides what ends.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from bt_tamp.quiet import quiet_imports
+
+    with quiet_imports():
+        from bt_tamp.executive.loop import run_scenario
+        from bt_tamp.report.recorder import RunRecorder
+        from scenarios.errors import SceneError
+        from scenarios.load import load_scenario
+
+    try:
+        scenario = load_scenario(job.scene, job.options.seed)
+        result = run_scenario(scenario, job.options, RunRecorder(scenario))
+    except SceneError as error:
+        return Finished(job, "wrong_input", str(error))
+    except Exception as error:
+        return Finished(job, "crashed", f"{type(error).__name__}: {_short(error)}")
+    return Finished(job, result.outcome, result.reason, result.to_json())
+
+
+def _start_next(
+    waiting: Iterator[Job], executor: ProcessPoolExecutor, running: dict[Future, tuple[Job, ProcessPoolExecutor]]
+) -> None:
+    job = next(waiting, None)
+    if job is None:
+        executor.shutdown(wait=False)
+        return
+    running[executor.submit(run_job, job)] = (job, executor)
+
+
+def _executor() -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(max_workers=1, env=dict.fromkeys(THREADS, "1"))
+
+
+def _harvest(job: Job, future: Future) -> Finished:
+    try:
+        return future.result()
+    except BrokenProcessPool as error:
+        return Finished(job, "killed", f"its process vanished ({_short(error)})")
+
+
+def _short(error: BaseException) -> str:
+    text = " ".join(str(error).split())
+    return text if len(text) <= 200 else text[:199] + "…"
