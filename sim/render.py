@@ -1,0 +1,133 @@
+"""Pictures of a scene without a window: recorded states go in, pixels come out.
+
+Nothing is simulated: bodies and joints are put where they were recorded. Shadows are ours, from
+depth pictures taken from the light, so that both engines give the same.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import TracebackType
+
+import numpy as np
+from PIL import Image, ImageFilter
+
+from scenarios.scenario import Scenario
+from scenarios.shapes import Box, extents
+from sim.render_camera import VIEW_FROM, Camera
+from sim.render_egl import egl_works
+from sim.render_stage import ArmOnStage, Engine, Stage, add_room
+
+WIDTH, HEIGHT = 1280, 720
+ARM_HEIGHT = 0.85
+"""Metres above the base up to which the camera shows the arm."""
+
+LIGHT_FROM = np.array([-0.45, -0.75, 2.0])
+"""Direction from the scene to the light, in W."""
+
+LIGHT_SIZE = 720
+BIAS = np.float32(0.012)
+"""Metres by which something must be nearer to the light than a point in order to shade it."""
+
+SHADE = 72
+"""How much of 256 a shadow takes away."""
+
+
+class Renderer:
+    """Renders one scene. `engine` is "egl" (the graphics library) or "tiny" (plain software).
+
+    What never moves is rendered once, at twice the size; a picture then costs the robot and the
+    bodies only. A context manager; `close` frees the engine.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        engine: Engine | None = None,
+        width: int = WIDTH,
+        height: int = HEIGHT,
+        foot: float = 0.0,
+    ) -> None:
+        """`engine` None: EGL where it works. `foot`: part of the picture's height kept free at the bottom."""
+        self.engine: Engine = engine or ("egl" if egl_works() else "tiny")
+        self.camera = overview(scenario, width, height, foot)
+        self._light = overlook(scenario)
+        with Stage("tiny") as room:
+            add_room(room, scenario)
+            self._ground = room.look(twice(self.camera))[0]
+            self._ground = self._ground.reshape(height, 2, width, 2, 3).mean(axis=(1, 3)).astype(np.uint8)
+            self._ground_distance = room.look(self.camera)[1]
+            self._room_from_light = room.look(self._light)[1].ravel()
+        self._rays = self.camera.rays()
+        points = self._rays * self._ground_distance.reshape(-1, 1) + self.camera.eye.astype(np.float32)
+        self._ground_index, self._ground_lit = self._light.look_up(points)
+        self._stage = Stage(self.engine)
+        self._bodies = {
+            name: self._stage.add(body.shape, body.X_WO, body.color) for name, body in scenario.bodies.items()
+        }
+        self._robot = ArmOnStage(self._stage, scenario)
+
+    def __enter__(self) -> "Renderer":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the engine. The renderer can't be used afterwards."""
+        self._stage.close()
+
+    def picture(self, q: np.ndarray, opening: float, poses: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Pixels (height, width, 3) uint8 of a state: q (7,) rad, opening in m, poses (7,) as position and
+        quaternion xyzw in W by body."""
+        self._robot.put(q, opening)
+        for name, pose in poses.items():
+            self._stage.put(self._bodies[name], pose)
+        front, distance = self._stage.look(self.camera)
+        is_front = distance < self._ground_distance
+        picture = np.where(is_front[:, :, None], front, self._ground)
+        return shaded(picture, self._shadow(distance, is_front))
+
+    def _shadow(self, distance: np.ndarray, is_front: np.ndarray) -> np.ndarray:
+        """Which pixels (height, width) lie behind something, as the light sees it?"""
+        from_light = np.minimum(self._room_from_light, self._stage.look(self._light)[1].ravel())
+        shadow = from_light[self._ground_index] < self._ground_lit - BIAS
+        shown = np.flatnonzero(is_front)
+        points = self._rays[shown] * distance.ravel()[shown, None] + self.camera.eye.astype(np.float32)
+        index, away = self._light.look_up(points)
+        shadow[shown] = from_light[index] < away - BIAS
+        return shadow.reshape(is_front.shape)
+
+
+def shaded(picture: np.ndarray, shadow: np.ndarray) -> np.ndarray:
+    """The picture darkened where `shadow` (height, width) says so, with soft rims."""
+    mask = Image.fromarray(shadow.astype(np.uint8) * SHADE).filter(ImageFilter.BoxBlur(2))
+    keep = 256 - np.asarray(mask, dtype=np.uint16)
+    return (picture * keep[:, :, None] >> 8).astype(np.uint8)
+
+
+def overview(scenario: Scenario, width: int, height: int, foot: float = 0.0) -> Camera:
+    """The camera that sees arm, table, containers and everything that lies about."""
+    base = scenario.robot.X_WB
+    points = [base.act(np.array([0.0, 0.0, z])) for z in (0.0, ARM_HEIGHT)]
+    solids = [(scenario.table.shape, scenario.table.X_WT)]
+    solids += [(Box(region.size), region.X_WR) for region in scenario.regions.values()]
+    solids += [(body.shape, body.X_WO) for body in scenario.bodies.values()]
+    solids += [(fixture.shape, fixture.X_WO) for fixture in scenario.fixtures.values()]
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    for shape, X_WO in solids:
+        points += [X_WO.act(corner) for corner in corners * extents(shape)]
+    return Camera.seeing(np.array(points), base.rotation @ VIEW_FROM, width, height, foot)
+
+
+def overlook(scenario: Scenario) -> Camera:
+    """The light as a camera: far above, seeing everything that can cast a shadow."""
+    base = scenario.robot.X_WB.translation
+    reach = np.array([[x, y, z] for x in (-0.6, 1.1) for y in (-1.0, 1.0) for z in (-0.2, ARM_HEIGHT)])
+    return Camera.seeing(base + reach, LIGHT_FROM, LIGHT_SIZE, LIGHT_SIZE, tan_half=0.16)
+
+
+def twice(camera: Camera) -> Camera:
+    """The same view with twice as many pixels each way."""
+    return replace(camera, width=2 * camera.width, height=2 * camera.height)
