@@ -22,6 +22,15 @@ DROP = 0.01
 
 TILTS = np.radians([0.0, 40.0, 50.0, 60.0, 75.0, 90.0])
 YAWS = np.radians(np.arange(0.0, 360.0, 30.0))
+FIRM = 0.3
+"""Least width of the face an object stands on, as a share of its height."""
+
+LEVEL = 0.1
+"""Sine of the angle by which the hand may point upwards at release."""
+
+OVERTILT = np.radians(10.0)
+"""Angle by which a tilt may turn the hand past pointing straight down."""
+
 WALL_GAP = 0.005
 EDGE_GAP = 0.01
 
@@ -69,16 +78,17 @@ def placements(
 ) -> Iterator[Placement]:
     """Placements of an object held at X_GO, the least tilted first, `spots` random positions for each direction.
 
-    The object keeps the face down on which it stood when grasped (nearest to level in the hand);
-    tilting turns it with the hand towards pointing straight down. Overlap with other things is
+    The object gets a face down on which it stands firmly; tilting turns it with the hand towards
+    pointing straight down. Overlap with other things is
     not looked at here.
     """
     surface = surface_of(place)
+    uprights = _uprights(shape, X_GO)
     tilts = TILTS[:1] if surface.wall == 0.0 else TILTS
     for tilt in tilts:
         for _ in range(spots):
             for yaw in rng.permutation(YAWS):
-                for R_upright in _uprights(X_GO):
+                for R_upright in uprights:
                     placement = _placement(shape, X_GO, surface, R_upright, (float(tilt), float(yaw)), rng)
                     if placement is not None:
                         yield placement
@@ -98,7 +108,7 @@ def _placement(
     level = approach.copy()
     level[2] = 0.0
     if tilt > 0.0:
-        if np.linalg.norm(level) < 0.5:
+        if np.linalg.norm(level) < np.sin(tilt - OVERTILT):
             return None
         axis = np.cross(level / np.linalg.norm(level), np.array([0.0, 0.0, -1.0]))
         R_WO = pin.exp3(axis / np.linalg.norm(axis) * tilt) @ R_WO
@@ -115,17 +125,22 @@ def _placement(
     return Placement(_numbers(X_WO), _numbers(X_rest))
 
 
-def _uprights(X_GO: SE3) -> list[np.ndarray]:
-    """Rotations R_WO with one face of the object down: the one below a hand that comes from above, else those
-    across which the fingers close (a flat thing grasped from the side stays flat, either way up)."""
+def _uprights(shape: Shape, X_GO: SE3) -> list[np.ndarray]:
+    """Rotations R_WO with one face of the object down on which it stands firmly, the hand not below level.
+
+    Those in which the hand points down the most come first.
+    """
     approach_O = X_GO.rotation.T[:, 2]
-    axis = int(np.argmax(np.abs(approach_O)))
-    if abs(approach_O[axis]) > 0.9:
-        closing_axis = int(np.argmax(np.abs(X_GO.rotation.T[:, 1])))
-        below = [_turn_down(np.sign(approach_O[axis]) * np.eye(3)[axis])]
-        return below + [_turn_down(sign * np.eye(3)[closing_axis]) for sign in (1.0, -1.0)]
-    axis = int(np.argmax(np.abs(X_GO.rotation.T[:, 1])))
-    return [_turn_down(sign * np.eye(3)[axis]) for sign in (1.0, -1.0)]
+    size = extents(shape)
+    found = []
+    for axis in range(3):
+        footprint = float(np.delete(size, axis).min())
+        for sign in (1.0, -1.0):
+            down_O = sign * np.eye(3)[axis]
+            downward = float(approach_O @ down_O)
+            if footprint >= FIRM * size[axis] and downward > -LEVEL:
+                found.append((-round(downward, 6), len(found), _turn_down(down_O)))
+    return [R for _, _, R in sorted(found, key=lambda entry: entry[:2])]
 
 
 def _turn_down(down_O: np.ndarray) -> np.ndarray:

@@ -1,0 +1,65 @@
+"""Pick and place, carried out in PyBullet."""
+
+import numpy as np
+import pytest
+from bench import Bench, action, scene_with, with_pose
+from py_trees.common import Status
+
+from planner.failure import RefinementFailure
+from planner.task.facts import place_of
+
+
+@pytest.mark.parametrize(("x", "y", "yaw"), [(0.68, -0.08, 0.0), (0.55, 0.2, 0.6)])
+def test_a_standing_box_is_picked_and_placed_in_a_bin_wherever_it_stands(x, y, yaw):
+    bench = Bench(with_pose(scene_with("box"), "box", x, y, yaw))
+    assert bench.do("pick(box, table)") is Status.SUCCESS
+    assert bench.scene.held is not None and bench.scene.held.name == "box"
+    assert bench.scene.poses["box"].translation[2] > 0.05 + 0.075 + 0.05
+    assert bench.do("place(box, right_bin)") is Status.SUCCESS
+    assert bench.scene.held is None
+    assert place_of(bench.scene, "box") == "right_bin"
+
+
+def test_a_held_object_can_be_put_down_on_the_table():
+    bench = Bench(scene_with("box"))
+    assert bench.do("pick(box, table)") is Status.SUCCESS
+    assert bench.do("place(box, table)") is Status.SUCCESS
+    assert place_of(bench.scene, "box") == "table"
+
+
+def test_the_sponge_is_picked_by_its_ends_and_hangs_level():
+    bench = Bench(scene_with("sponge", seed=3))
+    assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
+    X_WO = bench.scene.poses["sponge"]
+    closing_W = bench.robot.X_WG(bench.scene.q).rotation[:, 1]
+    assert abs(closing_W @ X_WO.rotation[:, 0]) > 0.99
+    assert X_WO.rotation[2, 2] > np.cos(np.radians(3))
+
+
+def test_a_flat_book_has_no_grasp_as_it_lies_and_nothing_movable_is_to_blame():
+    bench = Bench(scene_with("book", "box"))
+    failure = bench.refine(action("pick(book, table)"))
+    assert isinstance(failure, RefinementFailure)
+    assert not failure.culprit_sets
+    assert "table" in failure.reason
+
+
+def test_a_box_between_two_others_is_blocked_by_them():
+    scenario = scene_with("box", "book")
+    crowded = with_pose(scenario, "box", 0.6, 0.0)
+    bench = Bench(crowded)
+    assert not isinstance(bench.refine(action("pick(box, table)")), RefinementFailure)
+
+
+def test_closing_on_nothing_is_told_as_a_missed_grasp():
+    bench = Bench(scene_with("box"))
+    what = action("pick(box, table)")
+    found = bench.refine(what)
+    assert not isinstance(found, RefinementFailure)
+    bench.context.refine = lambda _: (found, 0.0)
+    gone = with_pose(scene_with("box"), "box", 0.5, 0.3)
+    elsewhere = Bench(gone)
+    elsewhere.context.refine = lambda _: (found, 0.0)
+    assert elsewhere.do("pick(box, table)") is Status.FAILURE
+    assert elsewhere.context.failure is not None
+    assert elsewhere.context.failure.kind == "GraspMissed"
