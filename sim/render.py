@@ -5,7 +5,7 @@ depth pictures taken from the light, so that both engines give the same.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import TracebackType
 
 import numpy as np
@@ -14,7 +14,7 @@ from PIL import Image, ImageFilter
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, extents
 from sim.render_camera import VIEW_FROM, Camera
-from sim.render_egl import egl_works
+from sim.render_egl import egl_is_faster
 from sim.render_stage import ArmOnStage, Engine, Stage, add_room
 
 WIDTH, HEIGHT = 1280, 720
@@ -32,33 +32,43 @@ SHADE = 72
 """How much of 256 a shadow takes away."""
 
 
+@dataclass(frozen=True)
+class Backdrop:
+    """What never moves: `colours` (height, width, 3) uint8, `distance` (height, width) in metres ahead of
+    `camera`, and `from_light` (LIGHT_SIZE²,) in metres ahead of the light."""
+
+    camera: Camera
+    light: Camera
+    colours: np.ndarray
+    distance: np.ndarray
+    from_light: np.ndarray
+
+    @staticmethod
+    def of(scenario: Scenario, width: int = WIDTH, height: int = HEIGHT, foot: float = 0.0) -> "Backdrop":
+        """Render a scene's room at twice the size. `foot`: part of the height kept free at the bottom."""
+        camera, light = overview(scenario, width, height, foot), overlook(scenario)
+        with Stage("tiny") as room:
+            add_room(room, scenario)
+            fine = room.look(twice(camera))[0].astype(np.uint16).reshape(height, 2, width, 2, 3)
+            colours = (fine[:, 0, :, 0] + fine[:, 0, :, 1] + fine[:, 1, :, 0] + fine[:, 1, :, 1]) // 4
+            distance = room.look(camera)[1]
+            return Backdrop(camera, light, colours.astype(np.uint8), distance, room.look(light)[1].ravel())
+
+
 class Renderer:
     """Renders one scene. `engine` is "egl" (the graphics library) or "tiny" (plain software).
 
-    What never moves is rendered once, at twice the size; a picture then costs the robot and the
-    bodies only. A context manager; `close` frees the engine.
+    A picture costs the robot and the bodies only, as the backdrop is given. A context manager;
+    `close` frees the engine.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        engine: Engine | None = None,
-        width: int = WIDTH,
-        height: int = HEIGHT,
-        foot: float = 0.0,
-    ) -> None:
-        """`engine` None: EGL where it works. `foot`: part of the picture's height kept free at the bottom."""
-        self.engine: Engine = engine or ("egl" if egl_works() else "tiny")
-        self.camera = overview(scenario, width, height, foot)
-        self._light = overlook(scenario)
-        with Stage("tiny") as room:
-            add_room(room, scenario)
-            self._ground = room.look(twice(self.camera))[0]
-            self._ground = self._ground.reshape(height, 2, width, 2, 3).mean(axis=(1, 3)).astype(np.uint8)
-            self._ground_distance = room.look(self.camera)[1]
-            self._room_from_light = room.look(self._light)[1].ravel()
+    def __init__(self, scenario: Scenario, backdrop: Backdrop | None = None, engine: Engine | None = None) -> None:
+        """`engine` None: EGL where it is faster."""
+        self.engine: Engine = engine or ("egl" if egl_is_faster() else "tiny")
+        self._ground = backdrop or Backdrop.of(scenario)
+        self.camera, self._light = self._ground.camera, self._ground.light
         self._rays = self.camera.rays()
-        points = self._rays * self._ground_distance.reshape(-1, 1) + self.camera.eye.astype(np.float32)
+        points = self._rays * self._ground.distance.reshape(-1, 1) + self.camera.eye.astype(np.float32)
         self._ground_index, self._ground_lit = self._light.look_up(points)
         self._stage = Stage(self.engine)
         self._bodies = {
@@ -85,13 +95,13 @@ class Renderer:
         for name, pose in poses.items():
             self._stage.put(self._bodies[name], pose)
         front, distance = self._stage.look(self.camera)
-        is_front = distance < self._ground_distance
-        picture = np.where(is_front[:, :, None], front, self._ground)
+        is_front = distance < self._ground.distance
+        picture = np.where(is_front[:, :, None], front, self._ground.colours)
         return shaded(picture, self._shadow(distance, is_front))
 
     def _shadow(self, distance: np.ndarray, is_front: np.ndarray) -> np.ndarray:
         """Which pixels (height, width) lie behind something, as the light sees it?"""
-        from_light = np.minimum(self._room_from_light, self._stage.look(self._light)[1].ravel())
+        from_light = np.minimum(self._ground.from_light, self._stage.look(self._light)[1].ravel())
         shadow = from_light[self._ground_index] < self._ground_lit - BIAS
         shown = np.flatnonzero(is_front)
         points = self._rays[shown] * distance.ravel()[shown, None] + self.camera.eye.astype(np.float32)
