@@ -22,6 +22,9 @@ from skills.skill import MAX_PATHS, Toolkit, Unfit, refine_by_sampling
 from skills.waypoints import raised, shifted
 
 HEIGHT = 0.08
+CLOSE = 0.015
+"""Metres above the surface from which contact is sought slowly."""
+
 PROBE = 0.012
 OVERHANGS = (0.055, 0.065, 0.045, 0.075)
 """Metres by which the object is to stand out beyond the edge: enough for the fingers' pads."""
@@ -37,7 +40,9 @@ LEFT_OVER = 0.3
 FORCE_FACTOR = 2.5
 LEAST_FORCE = 6.0
 SPEED = 0.08
-TOUCH_SPEED = 0.04
+TOUCH_SPEED = 0.015
+"""m/s: on something rigid, touchdown at 0.03 m/s peaks above 50 N."""
+
 NEAR_SPEED = 0.15
 
 
@@ -147,6 +152,7 @@ class Drag:
             Refine(run, context),
             Open("close", run, context),
             Follow("pre-drag", run, context),
+            Follow("approach", run, context),
             Touch("descend", run, context),
             Slide("drag", run, context),
             Follow("retract", run, context),
@@ -173,13 +179,21 @@ class Drag:
         touching = pairs(robot.finger_links, name)
         sliding = touching | pairs(name, surface)
         failure: MotionFailure | None = None
-        waypoints = (raised(X_WG_press, HEIGHT), X_WG_press, low, X_WG_press, X_WG_end, raised(X_WG_end, HEIGHT))
+        waypoints = (
+            raised(X_WG_press, HEIGHT),
+            raised(X_WG_press, CLOSE),
+            X_WG_press,
+            low,
+            X_WG_press,
+            X_WG_end,
+            raised(X_WG_end, HEIGHT),
+        )
         for path in motion.legs(waypoints, scene.q)[:MAX_PATHS]:
-            down, probe, _, along, up = path
+            down, near, probe, _, along, up = path
             moved = closed.moved(name, shifted(X_WO, X_WG_end.translation - X_WG_press.translation))
             failure = (
                 motion.line_is_free(dragging, along, sliding)
-                or motion.line_is_free(closed, down, touching)
+                or motion.line_is_free(closed, np.vstack([down, near]), touching)
                 or motion.line_is_free(moved, up, touching)
             )
             if failure:
@@ -190,10 +204,11 @@ class Drag:
                 continue
             press = Press(force, np.array(contact.stiffness))
             still = reach.standstill(scene.q)
-            probing = np.vstack([down, probe[1:]])
+            probing = np.vstack([near, probe[1:]])
             return (
                 Phase("close", "open", still, 0.0),
                 Phase("pre-drag", "move", reach, 0.0),
+                Phase("approach", "approach", motion.time_line(down, NEAR_SPEED), 0.0, None, touching),
                 Phase("descend", "touch", motion.time_line(probing, TOUCH_SPEED), 0.0, None, sliding, press),
                 Phase("drag", "slide", motion.time_line(along, SPEED), 0.0, along_with, sliding, press),
                 Phase("retract", "approach", motion.time_line(up, NEAR_SPEED), 0.0, None, sliding),

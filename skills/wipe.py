@@ -27,6 +27,9 @@ from skills.skill import MAX_PATHS, Toolkit, Unfit, refine_by_sampling
 from skills.waypoints import raised, shifted
 
 HEIGHT = 0.08
+CLOSE = 0.015
+"""Metres above the surface from which contact is sought slowly."""
+
 GAP = 0.02
 """Metres between sponge and crumb where the sponge comes down."""
 
@@ -37,7 +40,7 @@ LATERAL_STEP = 0.015
 DIRECTION_STEPS = 7
 SIDE_MARGIN = 0.01
 OVERRUN = 0.005
-TOUCH_SPEED = 0.04
+TOUCH_SPEED = 0.03
 NEAR_SPEED = 0.15
 
 
@@ -164,6 +167,7 @@ class Wipe:
         contact = sequence(
             "stroke with the sponge",
             Follow("pre-wipe", run, context),
+            Follow("approach", run, context),
             Touch("descend", run, context),
             Slide("stroke", run, context),
             Follow("retract", run, context),
@@ -193,12 +197,20 @@ class Wipe:
         touching = pairs(held.name, surface) | pairs(robot.finger_links, held.name)
         sweeping = touching | pairs(robot.finger_links | {held.name}, crumbs) if crumbs else touching
         failure: MotionFailure | None = None
-        waypoints = (X_WG_pre, X_WG_start, low, X_WG_start, X_WG_end, raised(X_WG_end, HEIGHT))
+        waypoints = (
+            X_WG_pre,
+            raised(X_WG_start, CLOSE),
+            X_WG_start,
+            low,
+            X_WG_start,
+            X_WG_end,
+            raised(X_WG_end, HEIGHT),
+        )
         for path in motion.legs(waypoints, scene.q)[:MAX_PATHS]:
-            down, probe, _, along, up = path
+            down, near, probe, _, along, up = path
             failure = (
                 motion.line_is_free(pressed, along, touching)
-                or motion.line_is_free(pressed, down, touching)
+                or motion.line_is_free(pressed, np.vstack([down, near]), touching)
                 or motion.line_is_free(pressed, up, touching)
             )
             if failure:
@@ -210,10 +222,11 @@ class Wipe:
             press = Press(contact.force, np.array(contact.stiffness))
             return (
                 Phase("pre-wipe", "move", carried(robot, reach, held), scene.opening, held, touching),
+                Phase("approach", "approach", motion.time_line(down, NEAR_SPEED), scene.opening, held, sweeping),
                 Phase(
                     "descend",
                     "touch",
-                    motion.time_line(np.vstack([down, probe[1:]]), TOUCH_SPEED),
+                    motion.time_line(np.vstack([near, probe[1:]]), TOUCH_SPEED),
                     scene.opening,
                     held,
                     sweeping,

@@ -13,7 +13,8 @@ from planner.task.facts import place_of
 def test_a_standing_box_is_picked_and_placed_in_a_bin_wherever_it_stands(x, y, yaw):
     bench = Bench(with_pose(scene_with("box"), "box", x, y, yaw))
     assert bench.do("pick(box, table)") is Status.SUCCESS
-    assert bench.scene.held is not None and bench.scene.held.name == "box"
+    assert bench.scene.held is not None
+    assert bench.scene.held.name == "box"
     assert bench.scene.poses["box"].translation[2] > 0.05 + 0.075 + 0.05
     assert bench.do("place(box, right_bin)") is Status.SUCCESS
     assert bench.scene.held is None

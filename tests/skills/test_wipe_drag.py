@@ -9,7 +9,9 @@ from planner.failure import RefinementFailure
 from planner.task.facts import place_of
 
 
-@pytest.mark.parametrize(("contact", "x", "y"), [("hybrid", 0.73, 0.055), ("hybrid", 0.6, 0.15), ("impedance", 0.66, 0.1)])
+@pytest.mark.parametrize(
+    ("contact", "x", "y"), [("hybrid", 0.73, 0.055), ("hybrid", 0.6, 0.15), ("impedance", 0.66, 0.1)]
+)
 def test_a_crumb_is_wiped_into_the_dustpan(contact, x, y):
     bench = Bench(with_pose(scene_with("carrot", "sponge"), "carrot", x, y), contact)
     assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS

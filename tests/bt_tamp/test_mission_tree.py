@@ -1,0 +1,216 @@
+"""What the root tree means, with scripted skills and a scripted planner in the places of the real ones."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_tamp.executive.agenda import Agenda
+from bt_tamp.executive.mission import GOAL_TIME, mission
+from bt_tamp.executive.validity import resume_at, still_good_while
+from planner.failure import ExecutionFailure
+from planner.task.symbols import Fact, GroundAction, Step, TaskPlan
+
+TICK = 0.02
+AT = {place: Fact("at", (place,)) for place in ("start", "a", "b", "c")}
+
+
+def go(origin, place):
+    """A step that moves from one place to the next."""
+    return Step(
+        GroundAction("go", (origin, place)), frozenset({AT[origin]}), frozenset({AT[place]}), frozenset({AT[origin]})
+    )
+
+
+ROUTE = TaskPlan((go("start", "a"), go("a", "b"), go("b", "c")), frozenset({AT["c"]}))
+
+
+class Scripted(Behaviour):
+    """Takes some ticks, then brings about its step's effects; fails when told to."""
+
+    def __init__(self, world, step):
+        super().__init__(str(step.action))
+        self.world, self.step, self.left = world, step, 3
+
+    def initialise(self):
+        self.left = self.world.ticks
+        self.world.log.append(f"begin {self.step.action.args[1]}")
+
+    def update(self):
+        self.left -= 1
+        if self.world.fails and self.left < 2:
+            self.world.context.fail(ExecutionFailure(self.step.action, "it broke"))
+            return Status.FAILURE
+        if self.left == self.world.retract:
+            self.world.facts = self.step.apply(self.world.facts)
+        if self.left > 0:
+            return Status.RUNNING
+        self.world.log.append(f"end {self.step.action.args[1]}")
+        return Status.SUCCESS
+
+    def terminate(self, new_status):
+        if new_status == Status.INVALID and self.status == Status.RUNNING:
+            self.world.log.append(f"stopped {self.step.action.args[1]}")
+
+
+class Plans(Behaviour):
+    """The planner node's place: adopts the route, or fails."""
+
+    def __init__(self, world):
+        super().__init__("plan")
+        self.world = world
+
+    def update(self):
+        self.world.log.append("plan")
+        if self.world.route is None:
+            return Status.FAILURE
+        self.world.agenda.drop()
+        self.world.context.failure = None
+        self.world.fails = False
+        self.world.agenda.adopt(self.world.route, (None,) * len(self.world.route.steps), self.world.context, "planned")
+        return Status.SUCCESS
+
+
+class World:
+    """Facts, time and the mission tree over them."""
+
+    def __init__(self, facts=("start",)):
+        self.facts = frozenset(AT[place] for place in facts)
+        self.route, self.fails, self.ticks, self.retract, self.log = ROUTE, False, 3, 0, []
+        self.speed = 0.0
+        context = SimpleNamespace(scene=None, failure=None, report=lambda *_, **__: None, observation=None)
+        context.fail = lambda failure: setattr(context, "failure", context.failure or failure)
+        self.context = context
+        steps = {step.action: step for step in ROUTE.steps}
+        skill = SimpleNamespace(subtree=lambda run, _: Scripted(self, steps[run.action]))
+        self.agenda = Agenda(ROUTE.goal, {"go": skill}, lambda _: self.facts, lambda _: None)
+        self.mission = mission(self.agenda, context, Plans(self))
+        self.t = 0.0
+
+    def tick(self, count=1):
+        for _ in range(count):
+            velocities = {"thing": np.array([self.speed, 0, 0, 0, 0, 0])}
+            self.context.observation = SimpleNamespace(t=self.t, velocities=velocities)
+            self.mission.root.tick_once()
+            self.t += TICK
+        return self
+
+    def until_done(self, limit=200):
+        for _ in range(limit):
+            if self.tick().mission.goal.status is Status.SUCCESS:
+                return self
+        raise AssertionError(f"the goal was not reported within {limit} ticks: {self.log}")
+
+
+def test_the_plan_is_carried_out_step_by_step_and_the_goal_ends_the_mission():
+    world = World().until_done()
+    assert world.log == ["plan", "begin a", "end a", "begin b", "end b", "begin c", "end c"]
+    assert [str(action) for action in world.agenda.executed] == ["go(start, a)", "go(a, b)", "go(b, c)"]
+
+
+def test_the_end_of_the_plan_alone_never_ends_the_mission():
+    world = World()
+    world.retract = -1
+    world.tick(100)
+    assert world.mission.goal.status is Status.FAILURE
+    assert world.mission.root.status is not Status.SUCCESS
+
+
+def test_the_goal_counts_only_after_it_held_for_half_a_second_with_everything_at_rest():
+    world = World(facts=("c",))
+    world.speed = 0.2
+    world.tick(60)
+    assert world.mission.goal.status is Status.FAILURE
+    world.speed, start = 0.0, world.t
+    world.until_done()
+    assert world.t - start >= GOAL_TIME
+
+
+def test_a_failed_action_puts_the_plan_out_of_force_and_the_planner_runs_before_anything_acts_again():
+    world = World()
+    world.ticks = 10
+    while "begin a" not in world.log:
+        world.tick()
+    world.fails = True
+    world.tick(12)
+    after = world.log[world.log.index("begin a") + 1 :]
+    assert after[0] == "plan"
+    assert world.log.count("plan") == 2
+
+
+def test_without_a_plan_nothing_acts():
+    world = World()
+    world.route = None
+    world.tick(5)
+    assert set(world.log) == {"plan"}
+    assert world.mission.root.status is Status.FAILURE
+
+
+def test_what_somebody_else_has_done_is_skipped_without_a_new_plan():
+    world = World()
+    world.tick(2)
+    while "end a" not in world.log:
+        world.tick()
+    world.facts = frozenset({AT["b"]})
+    world.until_done()
+    assert "begin b" not in world.log
+    assert world.log.count("plan") == 1
+
+
+def test_what_was_undone_is_done_again_without_a_new_plan():
+    world = World()
+    while "end b" not in world.log:
+        world.tick()
+    world.facts = frozenset({AT["start"]})
+    world.until_done()
+    assert world.log.count("begin a") == 2
+    assert world.log.count("plan") == 1
+
+
+def test_the_running_action_counts_as_done_while_its_own_facts_are_in_between():
+    world = World()
+    while "begin b" not in world.log:
+        world.tick()
+    world.facts = frozenset()
+    world.tick()
+    assert world.log.count("plan") == 1
+    world.facts = frozenset({AT["a"]})
+    world.until_done()
+
+
+def test_a_plan_whose_rest_no_longer_applies_is_replaced_and_the_old_tree_is_stopped_first():
+    world = World()
+    while "begin a" not in world.log:
+        world.tick()
+    never = Fact("never")
+    step = world.agenda.plan.steps[1]
+    broken = Step(step.action, step.preconditions | {never}, step.adds, step.deletes)
+    world.agenda.plan = TaskPlan((world.agenda.plan.steps[0], broken, world.agenda.plan.steps[2]), ROUTE.goal)
+    world.tick()
+    assert world.log[-3:] == ["plan", "stopped a", "begin a"]
+
+
+def test_a_reached_goal_does_not_cut_short_the_action_that_reached_it():
+    world = World()
+    world.ticks, world.retract = 60, 55
+    while "begin c" not in world.log:
+        world.tick()
+    world.tick(50)
+    assert ROUTE.goal <= world.facts
+    assert world.mission.goal.status is Status.FAILURE
+    world.until_done()
+    assert world.log[-1] == "end c"
+
+
+@pytest.mark.parametrize(("facts", "expected"), [(("start",), 0), (("a",), 1), (("b",), 2), (("c",), 3), ((), None)])
+def test_a_plan_is_resumed_at_the_largest_step_from_which_it_reaches_the_goal(facts, expected):
+    assert resume_at(ROUTE, frozenset(AT[place] for place in facts)) == expected
+
+
+def test_the_rest_of_a_plan_is_judged_as_if_the_running_step_were_done():
+    assert still_good_while(ROUTE, 0, frozenset({AT["start"]}))
+    assert still_good_while(ROUTE, 0, frozenset())
+    unreachable = TaskPlan(ROUTE.steps, frozenset({Fact("never")}))
+    assert not still_good_while(unreachable, 0, frozenset({AT["start"]}))
