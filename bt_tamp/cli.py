@@ -79,7 +79,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             print("bt-tamp, not installed")
         return 0
     if arguments.command is None:
-        parser().print_usage(sys.stderr)
         print("bt-tamp: name a command (see bt-tamp --help)", file=sys.stderr)
         return WRONG_INPUT
     try:

@@ -1,7 +1,8 @@
 """Whole runs in parallel processes. A run that crashes, or whose process is killed, costs none of the others."""
 
+import re
 import signal
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 
@@ -33,29 +34,35 @@ class Finished:
     result: str | None = None
 
 
-def run_jobs(jobs: Iterable[Job], processes: int) -> Generator[Finished, None, None]:
-    """Run the jobs, so many at a time, and yield each as it comes to its end.
+def run_jobs(
+    jobs: Iterable[Job], processes: int, work: Callable[[Job], Finished] | None = None
+) -> Generator[Finished, None, None]:
+    """Run the jobs, so many at a time, and yield each as it comes to its end. work: what runs a job (`run_job`).
 
     Every process is an executor of its own, so that one that dies can be told from its neighbours.
     Leaving the iterator early ends the processes.
     """
+    work = run_job if work is None else work
     waiting = iter(jobs)
+    idle = [_executor() for _ in range(processes)]
     running: dict[Future, tuple[Job, ProcessPoolExecutor]] = {}
     try:
-        for _ in range(processes):
-            _start_next(waiting, _executor(), running)
-        while running:
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
+        while True:
+            while idle and (job := next(waiting, None)) is not None:
+                executor = idle.pop()
+                running[executor.submit(work, job)] = (job, executor)
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
                 job, executor = running.pop(future)
                 finished = _harvest(job, future)
                 if finished.outcome == "killed":
                     executor.shutdown(wait=False, kill_workers=True)
                     executor = _executor()
-                _start_next(waiting, executor, running)
+                idle.append(executor)
                 yield finished
     finally:
-        for _, executor in running.values():
+        for executor in [*idle, *(executor for _, executor in running.values())]:
             executor.shutdown(wait=False, kill_workers=True)
 
 
@@ -81,16 +88,6 @@ def run_job(job: Job) -> Finished:
     return Finished(job, result.outcome, result.reason, result.to_json())
 
 
-def _start_next(
-    waiting: Iterator[Job], executor: ProcessPoolExecutor, running: dict[Future, tuple[Job, ProcessPoolExecutor]]
-) -> None:
-    job = next(waiting, None)
-    if job is None:
-        executor.shutdown(wait=False)
-        return
-    running[executor.submit(run_job, job)] = (job, executor)
-
-
 def _executor() -> ProcessPoolExecutor:
     return ProcessPoolExecutor(max_workers=1, env=dict.fromkeys(THREADS, "1"))
 
@@ -99,7 +96,10 @@ def _harvest(job: Job, future: Future) -> Finished:
     try:
         return future.result()
     except BrokenProcessPool as error:
-        return Finished(job, "killed", f"its process vanished ({_short(error)})")
+        codes = re.search(r"\{(.+)\}", str(error))
+        return Finished(job, "killed", "its process vanished" + (f", {codes[1]}" if codes else ""))
+    except Exception as error:
+        return Finished(job, "crashed", f"{type(error).__name__}: {_short(error)}")
 
 
 def _short(error: BaseException) -> str:

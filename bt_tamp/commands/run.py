@@ -2,12 +2,12 @@
 
 import argparse
 import os
-import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_tamp.commands.choices import add_planning, add_scene, add_time_limit, options_of, scenario_of
+from bt_tamp.commands.stopping import stop_on_signals
 
 if TYPE_CHECKING:
     from bt_tamp.report.result import RunResult
@@ -34,9 +34,7 @@ def call(arguments: argparse.Namespace) -> int:
     from bt_tamp.report.folder import RunFolder
 
     folder = RunFolder.for_run(scenario.name, scenario.seed, arguments.out, arguments.force)
-    # As with Ctrl-C: whoever stops the run from outside gets a whole folder too.
-    for stop in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(stop, signal.default_int_handler)
+    stop_on_signals()
 
     from bt_tamp.quiet import quiet_imports
 
@@ -68,7 +66,7 @@ def _closing(result: "RunResult", folder: Path) -> str:
         said = f"Goal reached in {result.robot_s:.0f} s of robot time ({result.wall_s:.0f} s of real time)"
     else:
         missing = [literal for literal, holds in result.goal.items() if not holds]
-        said = f"Goal not reached ({', '.join(missing) or result.outcome}): {result.reason}"
+        said = f"Goal not reached: {result.reason}; missing: {', '.join(missing) or 'rest at the end'}"
     parts = [RESULT, EVENTS, f"{TREES}/", f"{PDDL}/"]
     if (folder / VIDEO).exists():
         parts.insert(0, VIDEO)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_tamp.commands.choices import add_planning, add_time_limit, options_of
+from bt_tamp.commands.stopping import stop_on_signals
 
 if TYPE_CHECKING:
     from bt_tamp.sweep import Finished, Job
@@ -65,6 +66,7 @@ def call(arguments: argparse.Namespace) -> int:
         if stored and not arguments.resume:
             raise UserError(f"{arguments.store}: holds {len(stored)} of these runs already; --resume goes on with it")
         left = [job for job in jobs if job not in stored or stored[job].outcome in UNFINISHED]
+        stop_on_signals()
         try:
             _run(left, arguments.jobs, store)
         except KeyboardInterrupt:

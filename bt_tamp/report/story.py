@@ -28,7 +28,7 @@ class _Teller:
         self._is_planning = False
         self._started: dict[str, float] = {}
         self._phases: list[str] = []
-        self._number = 0
+        self._running: str | None = None
         self._last_failure = ""
 
     def hear(self, event: Event) -> None:
@@ -85,19 +85,20 @@ class _Teller:
         self._heading("What was done")
 
     def _action_started(self, event: Event, data: Any) -> None:
+        self._running, self._phases = data["action"], []
         self._started[data["action"]] = event.t
-        self._phases = []
 
     def _phase(self, event: Event, data: Any) -> None:
         self._phases.append(data["phase"])
 
     def _action_done(self, event: Event, data: Any) -> None:
+        self._running = None
         start = self._started.get(data["action"], event.t)
         self._say(f"{data['action']}: {', '.join(self._phases)}.", f"{start:7.1f} – {event.t:5.1f} s  ")
 
     def _action_failed(self, event: Event, data: Any) -> None:
         where = f" in its phase {self._phases[-1]!r}" if self._phases else ""
-        self._last_failure = data["reason"]
+        self._running, self._last_failure = None, data["reason"]
         self._say(f"{data['action']} failed{where}: {data['reason']}.", f"{event.t:7.1f} s          ")
 
     def _replan(self, event: Event, data: Any) -> None:
@@ -105,14 +106,17 @@ class _Teller:
         self._say(f"The plan was dropped{reason}, and a new one sought from what was observed then.")
 
     def _goal_reached(self, event: Event, data: Any) -> None:
-        self._say("Every literal of the goal held, everything at rest.", f"{event.t:7.1f} s          ")
+        self._say("The goal held, everything at rest.", f"{event.t:7.1f} s          ")
 
     def end(self, result: RunResult | None) -> None:
+        if self._running is not None:
+            where = f", in its phase {self._phases[-1]!r}" if self._phases else ""
+            self._say(f"{self._running} was under way{where}.", f"{self._started[self._running]:7.1f} s          ")
         self._heading("How it ended")
         if result is None:
             self._say("The run was cut off: it left no result.")
             return
-        self._say(f"{_ENDINGS[result.outcome]}: {result.reason}.")
+        self._say(_ENDINGS[result.outcome].format(reason=result.reason))
         missing = [literal for literal, holds in result.goal.items() if not holds]
         if missing:
             self._say(f"Of the goal, {', '.join(missing)} did not hold.")
@@ -134,12 +138,12 @@ class _Teller:
 
 
 _ENDINGS = {
-    "goal_reached": "The goal was reached",
-    "planned": "A plan was found",
-    "proven_infeasible": "It was proven that the goal can't be reached",
-    "no_plan": "No plan was found within the budget",
-    "gave_up": "The run gave up",
-    "interrupted": "It was stopped",
+    "goal_reached": "The goal was reached.",
+    "planned": "A plan was found.",
+    "proven_infeasible": "The goal was proven out of reach: {reason}.",
+    "no_plan": "No plan was found within the budget: {reason}.",
+    "gave_up": "The run gave up: {reason}.",
+    "interrupted": "The run was interrupted before its end.",
 }
 
 

@@ -1,0 +1,103 @@
+import json
+import os
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from bt_tamp.cli import main
+from bt_tamp.commands.sweep import seeds
+from bt_tamp.errors import UserError
+from bt_tamp.options import RunOptions
+from bt_tamp.report.result import RunResult
+from bt_tamp.sweep import Finished, Job, run_jobs
+from bt_tamp.sweep_store import SweepStore
+from bt_tamp.sweep_table import print_table, summaries
+
+
+def job(seed: int, scene: str = "fig2") -> Job:
+    return Job(scene, RunOptions(seed=seed))
+
+
+def reached(seed: int, robot_s: float) -> Finished:
+    result = RunResult("fig2", seed, "goal_reached", "", {}, robot_s=robot_s)
+    return Finished(job(seed), "goal_reached", "", result.to_json())
+
+
+def test_seeds_are_a_half_open_range_or_one_number() -> None:
+    assert list(seeds("2:5")) == [2, 3, 4]
+    assert list(seeds("7")) == [7]
+
+
+def test_a_process_that_vanishes_and_one_that_fails_cost_no_other_run() -> None:
+    def work(given: Job) -> Finished:
+        if given.options.seed == 1:
+            os._exit(9)
+        if given.options.seed == 2:
+            raise RuntimeError("broken on purpose")
+        return Finished(given, "goal_reached", "")
+
+    outcomes = {done.job.options.seed: done.outcome for done in run_jobs(map(job, range(5)), 2, work)}
+
+    assert outcomes == {0: "goal_reached", 1: "killed", 2: "crashed", 3: "goal_reached", 4: "goal_reached"}
+
+
+def test_the_libraries_of_a_run_keep_to_one_thread() -> None:
+    def work(given: Job) -> Finished:
+        return Finished(given, os.environ["OMP_NUM_THREADS"], "")
+
+    assert [done.outcome for done in run_jobs([job(0)], 1, work)] == ["1"]
+
+
+def test_a_result_is_found_again_by_scene_seed_and_options(tmp_path: Path) -> None:
+    with SweepStore(tmp_path / "s.db") as store:
+        store.add(reached(3, 12.5))
+    with SweepStore(tmp_path / "s.db") as store:
+        row = store.get(job(3))
+        others = [job(4), job(3, "fig1"), Job("fig2", RunOptions(seed=3, contact="impedance"))]
+
+        assert row is not None
+        assert json.loads(row.result or "")["robot_s"] == 12.5
+        assert store.stored(others) == {}
+
+
+def test_a_repeated_run_replaces_the_one_that_was_killed(tmp_path: Path) -> None:
+    with SweepStore(tmp_path / "s.db") as store:
+        store.add(Finished(job(0), "killed", "its process vanished"))
+        store.add(reached(0, 1.0))
+
+        assert [row.outcome for row in store.stored([job(0)]).values()] == ["goal_reached"]
+
+
+def test_a_file_that_is_no_store_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "s.db").write_text("no database, " * 100)
+    with pytest.raises(UserError, match=r"s\.db"):
+        SweepStore(tmp_path / "s.db")
+
+
+def test_the_table_counts_goals_takes_medians_and_names_failures(tmp_path: Path) -> None:
+    with SweepStore(tmp_path / "s.db") as store:
+        for done in (reached(0, 10.0), reached(1, 30.0), reached(2, 20.0), Finished(job(3), "killed", "gone")):
+            store.add(done)
+        rows = store.stored(map(job, range(5)))
+
+    (one,) = summaries(rows)
+    assert (one.runs, one.reached, one.robot_s) == (4, 3, 20.0)
+    assert one.failures == ((3, "killed: gone"),)
+    with (tmp_path / "table.txt").open("w") as file:
+        print_table(Console(file=file, width=100), rows)
+    assert "fig2, seed 3: killed: gone" in (tmp_path / "table.txt").read_text()
+
+
+def test_a_sweep_stores_real_runs_and_goes_on_only_when_told_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sweep = ["sweep", "fig2", "--seeds", "0:2", "--jobs", "1", "--max-sim-time", "0.1", "--store", str(tmp_path / "s")]
+
+    assert main(sweep) == 0
+    said = capsys.readouterr()
+    assert "fig2, seed 1: gave up" in said.out
+    assert main(sweep) == 2
+    assert "--resume" in capsys.readouterr().err
+    assert main([*sweep, "--resume"]) == 0
+    assert "fig2, seed 1: gave up" in capsys.readouterr().out
