@@ -1,22 +1,24 @@
 """A run's folder as a video, and a scene as a picture."""
 
 import os
+import signal
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
 from fractions import Fraction
+from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import av
 import numpy as np
 import pinocchio as pin
-from joblib import Parallel, delayed
 from PIL import Image
 
 from bt_tamp.report.film import Filming, Recording, Shot
-from bt_tamp.report.folder import SIGNALS, VIDEO, replacing
+from bt_tamp.report.folder import VIDEO, replacing
 from scenarios.scenario import Scenario
-from sim.render import Backdrop, Engine, Renderer
+from sim.render import HEIGHT, WIDTH, Backdrop, Engine, Renderer
 from sim.render_egl import egl_is_faster
 from sim.robot import RobotModel
 
@@ -90,21 +92,21 @@ def shots_of(recording: Recording, cost: float) -> list[tuple[Shot, int]]:
 def write_film(
     path: Path,
     shots: list[tuple[Shot, int]],
-    pictures: Iterator[np.ndarray],
+    pictures: Iterable[np.ndarray],
     progress: Callable[[int, int], None] | None = None,
+    size: tuple[int, int] = (WIDTH, HEIGHT),
 ) -> None:
-    """Encode pictures (height, width, 3) uint8, each repeated as its shot says."""
+    """Encode pictures (height, width, 3) uint8 of `size` (width, height), each repeated as its shot says."""
     with av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as container:
         stream = container.add_stream("libx264", rate=RATE, options={"crf": "21", "preset": "veryfast"})
+        stream.width, stream.height = size
         stream.pix_fmt = "yuv420p"
-        stream.time_base = Fraction(1, RATE)
         clock = 0
-        for done, ((_, repeats), picture) in enumerate(zip(shots, pictures, strict=True), start=1):
-            stream.height, stream.width = picture.shape[:2]
+        for done, ((_, repeats), picture) in enumerate(zip(shots, pictures, strict=False), start=1):
             frame = av.VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuv420p")
             for _ in range(repeats):
                 frame.pts = clock
-                frame.time_base = stream.time_base
+                frame.time_base = Fraction(1, RATE)
                 container.mux(stream.encode(frame))
                 clock += 1
             if progress is not None:
@@ -126,22 +128,27 @@ def _pictures(folder: Path, filming: Filming, shots: list[tuple[Shot, int]], wor
         yield from (filming.take(shot) for shot, _ in shots)
         return
     batches = [[shot for shot, _ in shots[start : start + BATCH]] for start in range(0, len(shots), BATCH)]
-    options: dict[str, Any] = {"return_as": "generator", "pre_dispatch": 2 * workers, "batch_size": 1}
-    key = (str(folder.resolve()), (folder / SIGNALS).stat().st_mtime_ns)
-    crew: Any = Parallel(n_jobs=workers, **options)
-    for batch in crew(delayed(_take_batch)(key, filming.backdrop, batch) for batch in batches):
-        yield from batch
+    crew = ProcessPoolExecutor(workers, get_context("spawn"), _start_worker, (folder, filming.backdrop))
+    try:
+        waiting: deque[Future[list[np.ndarray]]] = deque()
+        for batch in batches:
+            waiting.append(crew.submit(_take_batch, batch))
+            if len(waiting) > 2 * workers:
+                yield from waiting.popleft().result()
+        while waiting:
+            yield from waiting.popleft().result()
+    finally:
+        crew.shutdown(wait=False, cancel_futures=True)
 
 
-_filming: dict[tuple[str, int], Filming] = {}
-"""In a worker: what it films with, kept from batch to batch; by folder and age of its signals."""
+_worker: list[Filming] = []
+"""In a worker process: what it films with."""
 
 
-def _take_batch(key: tuple[str, int], backdrop: Backdrop, shots: list[Shot]) -> list[np.ndarray]:
-    """In a worker: the pictures of some shots."""
-    if key not in _filming:
-        for old in _filming.values():
-            old.close()
-        _filming.clear()
-        _filming[key] = Filming(Recording.load(Path(key[0])), backdrop, "tiny")
-    return [_filming[key].take(shot) for shot in shots]
+def _start_worker(folder: Path, backdrop: Backdrop) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _worker.append(Filming(Recording.load(folder), backdrop, "tiny"))
+
+
+def _take_batch(shots: list[Shot]) -> list[np.ndarray]:
+    return [_worker[0].take(shot) for shot in shots]
