@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 
 import numpy as np
-from PIL import Image, ImageFilter
+from PIL import Image, ImageChops, ImageFilter
 
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, extents
@@ -24,12 +24,12 @@ ARM_HEIGHT = 0.85
 LIGHT_FROM = np.array([-0.45, -0.75, 2.0])
 """Direction from the scene to the light, in W."""
 
-LIGHT_SIZE = 720
+LIGHT_SIZE = 560
 BIAS = np.float32(0.012)
 """Metres by which something must be nearer to the light than a point in order to shade it."""
 
 SHADE = 72
-"""How much of 256 a shadow takes away."""
+"""How much of 255 a shadow takes away."""
 
 
 @dataclass(frozen=True)
@@ -112,9 +112,8 @@ class Renderer:
 
 def shaded(picture: np.ndarray, shadow: np.ndarray) -> np.ndarray:
     """The picture darkened where `shadow` (height, width) says so, with soft rims."""
-    mask = Image.fromarray(shadow.astype(np.uint8) * SHADE).filter(ImageFilter.BoxBlur(2))
-    keep = 256 - np.asarray(mask, dtype=np.uint16)
-    return (picture * keep[:, :, None] >> 8).astype(np.uint8)
+    keep = Image.fromarray(255 - shadow.astype(np.uint8) * SHADE).filter(ImageFilter.BoxBlur(2))
+    return np.asarray(ImageChops.multiply(Image.fromarray(picture), Image.merge("RGB", (keep, keep, keep))))
 
 
 def overview(scenario: Scenario, width: int, height: int, foot: float = 0.0) -> Camera:

@@ -20,6 +20,9 @@ LONGEST = 0.32
 FINE = 2
 """Arrows and dots are drawn this many times larger and then reduced, for smooth rims."""
 
+ROOM = 24
+"""Pixels around arrows and dots that their rims may take."""
+
 _GREEN, _GREEN_RIM = (32, 178, 74, 255), (10, 84, 34, 255)
 _BLUE, _PALE = (30, 96, 235, 255), (150, 186, 250, 255)
 _INK, _WHITE, _QUIET, _AMBER = (22, 27, 34, 255), (250, 250, 250, 255), (166, 176, 190, 255), (255, 190, 92, 255)
@@ -70,23 +73,34 @@ def draw(
 
 
 def _draw_marks(image: Image.Image, camera: Camera, arrows: Sequence[Arrow], path: Path3 | None) -> None:
-    fine = Image.new("RGBA", (image.width * FINE, image.height * FINE))
+    marks = [camera.project(np.vstack([a.point, a.point + METRES_PER_NEWTON * a.force])) for a in arrows]
+    spots = camera.project(path.points) if path is not None else np.empty((0, 2))
+    covered = np.vstack([*marks, spots])
+    covered = covered[np.isfinite(covered).all(axis=1)]
+    if not len(covered):
+        return
+    left, top = np.clip(covered.min(axis=0) - ROOM, 0, image.size).astype(int)
+    right, bottom = np.clip(covered.max(axis=0) + ROOM, 0, image.size).astype(int)
+    if right <= left or bottom <= top:
+        return
+    corner = np.array([left, top])
+    fine = Image.new("RGBA", (int(right - left) * FINE, int(bottom - top) * FINE))
     pen = ImageDraw.Draw(fine)
-    if path is not None:
-        for place, (x, y) in enumerate(camera.project(path.points) * FINE):
-            if np.isfinite(x):
-                radius = 3.2 * FINE
-                colour = _BLUE if place < path.done else _PALE
-                pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour, outline=_WHITE, width=1)
+    for place, (x, y) in enumerate((spots - corner) * FINE):
+        if path is not None and np.isfinite(x):
+            radius = 3.2 * FINE
+            colour = _BLUE if place < path.done else _PALE
+            pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour, outline=_WHITE, width=1)
     for arrow in arrows:
-        _draw_arrow(pen, camera, arrow)
-    image.alpha_composite(fine.reduce(FINE))
+        _draw_arrow(pen, camera, arrow, corner)
+    image.alpha_composite(fine.reduce(FINE), (int(left), int(top)))
 
 
-def _draw_arrow(pen: ImageDraw.ImageDraw, camera: Camera, arrow: Arrow) -> None:
+def _draw_arrow(pen: ImageDraw.ImageDraw, camera: Camera, arrow: Arrow, corner: np.ndarray) -> None:
     size = float(np.linalg.norm(arrow.force))
     length = min(size * METRES_PER_NEWTON, LONGEST)
-    tail, tip = camera.project(np.vstack([arrow.point, arrow.point + arrow.force / size * length])) * FINE
+    ends = camera.project(np.vstack([arrow.point, arrow.point + arrow.force / size * length]))
+    tail, tip = (ends - corner) * FINE
     along = tip - tail
     seen = float(np.linalg.norm(along))
     if not np.isfinite(seen) or seen < 4 * FINE:
