@@ -1,7 +1,6 @@
 """Run a scene: plan, act, watch, plan again, until the goal is reached or given up."""
 
 import argparse
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,8 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Run, then say where everything lies; the exit code tells the outcome."""
-    has_display = bool(os.environ.get("DISPLAY"))
-    options = options_of(arguments, window=arguments.render and has_display)
+    from bt_tamp.display import has_display
+
+    options = options_of(arguments, window=arguments.render and has_display())
     scenario = scenario_of(arguments)
 
     from bt_tamp.report.folder import RunFolder
@@ -47,27 +47,41 @@ def call(arguments: argparse.Namespace) -> int:
         result = run_scenario(scenario, options, recorder)
     if arguments.render and not options.window and result.outcome != "interrupted":
         _render(folder.path)
-    print(_closing(result, folder.path))
+    print(_closing(result))
     print(folder.path)
     return result.exit_code
 
 
 def _render(folder: Path) -> None:
+    """The video, if it can be made: the run's outcome stands without it."""
     from bt_tamp.commands.render import render
+    from bt_tamp.errors import UserError
 
-    render(folder, None)
+    try:
+        render(folder, None)
+    except UserError as error:
+        print(f"bt-tamp: no video: {error}", file=sys.stderr)
 
 
-def _closing(result: "RunResult", folder: Path) -> str:
+def _closing(result: "RunResult") -> str:
     """Is the goal reached, and where does everything lie: one sentence."""
-    from bt_tamp.report.folder import EVENTS, PDDL, RESULT, TREES, VIDEO
-
     if result.outcome == "goal_reached":
         said = f"Goal reached in {result.robot_s:.0f} s of robot time ({result.wall_s:.0f} s of real time)"
     else:
         missing = [literal for literal, holds in result.goal.items() if not holds]
-        said = f"Goal not reached: {result.reason}; missing: {', '.join(missing) or 'rest at the end'}"
-    parts = [RESULT, EVENTS, f"{TREES}/", f"{PDDL}/"]
-    if (folder / VIDEO).exists():
-        parts.insert(0, VIDEO)
-    return f"{said.rstrip('.')}; everything lies in {folder}{os.sep} ({', '.join(parts)}, …)."
+        said = f"Goal not reached: {result.reason.rstrip('.')}; missing: {', '.join(missing) or 'rest at the end'}"
+    by_place: dict[str, list[str]] = {}
+    for name, place in sorted(result.places.items()):
+        by_place.setdefault(place, []).append(name)
+    lying = [f"{_listed(names)} {_where(place, len(names) > 1)}" for place, names in sorted(by_place.items())]
+    return f"{said}: {', '.join(lying)}."
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _where(place: str, are_many: bool) -> str:
+    if place == "hand":
+        return "still in the hand"
+    return f"{'lie' if are_many else 'lies'} {'on the' if place in ('table', 'floor') else 'in'} {place}"

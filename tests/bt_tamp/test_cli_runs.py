@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from bt_tamp.cli import COMMANDS, main
+from bt_tamp.display import has_display
 
 TABLE = """\
 version: 1
@@ -97,6 +98,11 @@ def test_a_run_that_gives_up_leaves_a_whole_folder(cut_short: Path) -> None:
     assert not [name for name in files if name.rpartition("/")[2].startswith(".")]
 
 
+def test_a_display_that_is_not_there_gives_no_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DISPLAY", ":4711")
+    assert not has_display()
+
+
 def test_the_story_of_a_run_can_be_told(cut_short: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", str(cut_short)]) == 0
     told = capsys.readouterr().out
@@ -104,7 +110,7 @@ def test_the_story_of_a_run_can_be_told(cut_short: Path, capsys: pytest.CaptureF
     assert "The run gave up: 0.8 s of simulated time have passed." in told
 
 
-@pytest.mark.parametrize("form", ["ascii", "unicode", "svg"])
+@pytest.mark.parametrize("form", ["ascii", "unicode", "dot", "svg"])
 def test_the_last_tree_of_a_run_is_shown(form: str, cut_short: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tree", str(cut_short), "--format", form]) == 0
     shown = capsys.readouterr().out
@@ -144,6 +150,13 @@ def test_a_plan_is_printed_with_its_phases(capsys: pytest.CaptureFixture[str]) -
     said = capsys.readouterr().out
     assert "1. pick(sponge, dustpan)" in said
     assert "stroke" in said
+
+
+def test_a_scene_is_shown_as_a_picture_and_as_facts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", "fig2", "--out", "fig2.png"]) == 0
+    said = capsys.readouterr().out
+    assert "in_bin(sponge, dustpan)" in said
+    assert (tmp_path / "fig2.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_tree_that_would_run_is_written(tmp_path: Path) -> None:
