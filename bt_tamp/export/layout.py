@@ -1,9 +1,11 @@
-"""Where each node of a tree is drawn: below its parent if that stays narrow, else as an outline.
+"""Where each node of a tree is drawn: below its parent if that stays narrow, else as an outline, and a long
+outline in columns.
 
 All lengths in pixels; x to the right, y down, the root's box at the origin's row.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from bt_tamp.export.snapshot import TreeNode
 
@@ -19,21 +21,34 @@ NAME_LIMIT = 64
 NOTE_LIMIT = 110
 BELOW_LIMIT = 34
 MAX_WIDTH = 1500.0
+MAX_HEIGHT = 1100.0
+COLUMNS_WIDTH = 1120.0
+BAND_GAP = 46.0
+BUS = 18.0
 
 _NARROW = frozenset("iljtfr.,:;'|!()[] ")
 _WIDE = frozenset("mwMW@%→⇉")
 
 
+Edge = Literal["curve", "elbow", "bus"]
+"""From the middle of the parent's lower edge; from the spine below it; from the spine along a line above a row."""
+
+
 @dataclass(frozen=True)
 class Placed:
-    """A node with its box: left edge x, upper edge y, width; `note_below` puts the message under the box."""
+    """A node with its box: left edge x, upper edge y, width; `edge` is the kind of line from its parent."""
 
     node: TreeNode
     x: float
     y: float
     width: float
-    note_below: bool
+    edge: Edge
     children: tuple["Placed", ...]
+
+    @property
+    def note_below(self) -> bool:
+        """Does the message stand under the box, rather than to its right?"""
+        return self.edge == "curve"
 
     @property
     def right(self) -> float:
@@ -69,27 +84,59 @@ def shortened(text: str, limit: int) -> str:
 def box_width(node: TreeNode) -> float:
     """Width of a node's box: symbol, name, status."""
     ends = 16 if node.kind in ("condition", "decorator") else 4
-    return BADGE + text_width(shortened(node.name, NAME_LIMIT), FONT) + 26 + ends
+    bold = 1.12 if node.kind in ("sequence", "selector", "parallel") else 1.0
+    return BADGE + text_width(shortened(node.name, NAME_LIMIT), FONT) * bold + 28 + ends
 
 
 def arrange(root: TreeNode) -> Placed:
-    """The tidy drawing if it is at most `MAX_WIDTH` wide, else the outline."""
+    """The tidy drawing if it is at most `MAX_WIDTH` wide, else the outline, in columns if it gets too long."""
     tidy = top_down(root)
-    return tidy if tidy.right <= MAX_WIDTH else outline(root)
+    if tidy.right <= MAX_WIDTH:
+        return tidy
+    plain = outline(root)
+    return plain if plain.bottom <= MAX_HEIGHT else outline(root, _widest(root))
 
 
-def outline(root: TreeNode) -> Placed:
-    """One node a row, children indented below their parent."""
-    row = 0
+def outline(root: TreeNode, spread: TreeNode | None = None) -> Placed:
+    """One node a row, children indented below their parent; those of `spread` side by side, in several bands."""
+    y = 0.0
 
     def place(node: TreeNode, depth: int) -> Placed:
-        nonlocal row
-        y = row * ROW
-        row += 1
-        children = tuple(place(child, depth + 1) for child in node.children)
-        return Placed(node, depth * INDENT, y, box_width(node), False, children)
+        nonlocal y
+        top = y
+        y += ROW
+        if node is spread:
+            children = _bands(node, depth * INDENT + INDENT, y)
+            y = max(child.bottom for child in children) + ROW - BOX
+        else:
+            children = tuple(place(child, depth + 1) for child in node.children)
+        return Placed(node, depth * INDENT, top, box_width(node), "elbow", children)
 
     return place(root, 0)
+
+
+def _bands(parent: TreeNode, left: float, top: float) -> tuple[Placed, ...]:
+    """The children of a node as outlines side by side, a new band where one is full."""
+    placed: list[Placed] = []
+    x, y, bottom = left, top + BUS, top
+    for child in parent.children:
+        own = outline(child)
+        if x > left and x + own.right > COLUMNS_WIDTH:
+            x, y = left, bottom + BAND_GAP
+        placed.append(replace(_moved(own, x, y), edge="bus"))
+        x += own.right + GAP
+        bottom = max(bottom, placed[-1].bottom)
+    return tuple(placed)
+
+
+def _moved(placed: Placed, x: float, y: float) -> Placed:
+    children = tuple(_moved(child, x, y) for child in placed.children)
+    return replace(placed, x=placed.x + x, y=placed.y + y, children=children)
+
+
+def _widest(root: TreeNode) -> TreeNode:
+    """The node with the most children; of several, the first one."""
+    return max(root.walk(), key=lambda node: len(node.children))
 
 
 def top_down(root: TreeNode) -> Placed:
@@ -111,7 +158,7 @@ def top_down(root: TreeNode) -> Placed:
             x = max(left, middle - own / 2)
         else:
             x = left + (need - own) / 2
-        return Placed(node, x, depth * LEVEL, own, True, tuple(children)), max(left + need, cursor - GAP)
+        return Placed(node, x, depth * LEVEL, own, "curve", tuple(children)), max(left + need, cursor - GAP)
 
     return place(root, 0.0, 0)[0]
 

@@ -10,6 +10,7 @@ from xml.sax.saxutils import escape, quoteattr
 from bt_tamp.export.layout import (
     BADGE,
     BOX,
+    BUS,
     FONT,
     NAME_LIMIT,
     NOTE,
@@ -116,18 +117,25 @@ def _group(placed: Placed, parent: Placed | None) -> Iterator[str]:
 def _edge(placed: Placed, parent: Placed, x: float, y: float) -> str:
     running = placed.node.status == "RUNNING"
     stroke = 'stroke="#dd8a00" stroke-width="2"' if running else 'stroke="#c3cbd5" stroke-width="1.5"'
-    if placed.note_below:
+    if placed.edge == "curve":
         start, end = parent.width / 2 - x, placed.width / 2
         top = BOX - y + (16 if parent.node.message else 0)
         middle = (top - 2) / 2
         curve = f"M{start:.1f},{top:.1f} C{start:.1f},{middle:.1f} {end:.1f},{middle:.1f} {end:.1f},-1"
         return f'<path class="edge" d="{curve}" {stroke}/>'
+    if placed.edge == "bus":
+        return f'<path class="edge" d="{bus(x, y)}" {stroke}/>'
     return f'<path class="edge" d="{elbow(x, y)}" {stroke}/>'
 
 
 def elbow(x: float, y: float) -> str:
     """The line from the spine below a parent's box to a child at offset (x, y)."""
     return f"M{SPINE - x:.1f},{BOX - y:.1f} V{BOX / 2 - 7:.1f} q0,7 7,7 H0"
+
+
+def bus(x: float, y: float) -> str:
+    """The line from the spine below a parent's box along a line above a child at offset (x, y), and down to it."""
+    return f"M{SPINE - x:.1f},{BOX - y:.1f} V{-BUS:g} H{SPINE - 7:g} q7,0 7,7 V0"
 
 
 def _box(node: TreeNode, width: float) -> Iterator[str]:
@@ -157,6 +165,8 @@ def _box(node: TreeNode, width: float) -> Iterator[str]:
     bold = ' font-weight="600"' if is_composite else ""
     name = _text(shortened(node.name, NAME_LIMIT))
     yield f'<text x="{BADGE + inset + 7:.1f}" y="{BOX / 2 + 4.6:.1f}" fill="{ink}"{bold}>{name}</text>'
+    if not node.name:
+        return
     mark = line if node.status == "RUNNING" else "none"
     yield (
         f'<path transform="translate({width - 14 - inset:.1f},{BOX / 2:g})" d="{_MARKS[node.status]}" '
