@@ -194,7 +194,8 @@ class Wipe:
         low = raised(X_WG_start, -PROBE)
 
         pressed = scene.without(crumbs)
-        touching = pairs(held.name, surface) | pairs(robot.finger_links, held.name)
+        gripping = pairs(robot.finger_links, held.name)
+        touching = gripping | pairs(held.name, surface)
         sweeping = touching | pairs(robot.finger_links | {held.name}, crumbs) if crumbs else touching
         failure: MotionFailure | None = None
         waypoints = (
@@ -215,13 +216,13 @@ class Wipe:
             )
             if failure:
                 continue
-            reach = motion.move(scene, [down[0]], touching)
+            reach = motion.move(scene, [down[0]], gripping)
             if isinstance(reach, MotionFailure):
                 failure = reach
                 continue
             press = Press(contact.force, np.array(contact.stiffness))
             return (
-                Phase("pre-wipe", "move", carried(robot, reach, held), scene.opening, held, touching),
+                Phase("pre-wipe", "move", carried(robot, reach, held), scene.opening, held, gripping),
                 Phase("approach", "approach", motion.time_line(down, NEAR_SPEED), scene.opening, held, sweeping),
                 Phase(
                     "descend",
