@@ -7,12 +7,12 @@ Nothing heavy is imported here or by the modules in `commands/` before one of th
 import argparse
 import importlib
 import io
-import os
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
 from bt_tamp.errors import UserError, one_line_of
+from bt_tamp.quiet import outliving_a_closed_pipe
 
 COMMANDS = {
     "run": "run a scene: plan, act, plan again until the goal is reached",
@@ -82,15 +82,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("bt-tamp: name a command (see bt-tamp --help)", file=sys.stderr)
         return WRONG_INPUT
     try:
-        code = arguments.call(arguments)
-        sys.stdout.flush()
+        code = 0
+        with outliving_a_closed_pipe():
+            code = arguments.call(arguments)
         return code
     except KeyboardInterrupt:
         print("bt-tamp: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        return 0
     except Exception as error:
         if not isinstance(error, _user_errors()):
             raise

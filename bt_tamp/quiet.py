@@ -1,4 +1,4 @@
-"""Libraries that greet on stderr when they are imported, kept quiet: there, a person expects errors only."""
+"""Output that nobody wants: libraries' greetings on stderr, and what is said into a closed pipe."""
 
 import os
 import sys
@@ -24,3 +24,15 @@ def quiet_imports() -> Iterator[None]:
         os.dup2(kept, 2)
         os.close(nowhere)
         os.close(kept)
+
+
+@contextmanager
+def outliving_a_closed_pipe() -> Iterator[None]:
+    """Inside the block stdout may turn out to be a closed pipe (`| head`): from then on it leads nowhere."""
+    try:
+        yield
+        sys.stdout.flush()
+    except BrokenPipeError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

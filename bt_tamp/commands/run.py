@@ -36,7 +36,7 @@ def call(arguments: argparse.Namespace) -> int:
     folder = RunFolder.for_run(scenario.name, scenario.seed, arguments.out, arguments.force)
     stop_on_signals()
 
-    from bt_tamp.quiet import quiet_imports
+    from bt_tamp.quiet import outliving_a_closed_pipe, quiet_imports
 
     with quiet_imports():
         from bt_tamp.executive.loop import run_scenario
@@ -47,8 +47,9 @@ def call(arguments: argparse.Namespace) -> int:
         result = run_scenario(scenario, options, recorder)
     if arguments.render and not options.window and result.outcome != "interrupted":
         _render(folder.path)
-    print(_closing(result))
-    print(folder.path)
+    with outliving_a_closed_pipe():
+        print(_closing(result))
+        print(folder.path)
     return result.exit_code
 
 

@@ -164,6 +164,17 @@ def test_the_tree_that_would_run_is_written(tmp_path: Path) -> None:
     assert "wipe(cube, table, dustpan)" in (tmp_path / "tree.svg").read_text()
 
 
+def test_a_run_outlives_the_reader_of_its_lines(tmp_path: Path) -> None:
+    run = [sys.executable, "-m", "bt_tamp", "run", "fig2", "--max-sim-time", "0.3", "--out", str(tmp_path / "run")]
+    process = subprocess.Popen(run, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.close()
+    assert process.wait(timeout=60) == 12
+    assert process.stderr.read() == ""
+    assert (tmp_path / "run" / "result.json").exists()
+
+
 def test_an_interrupted_run_says_so_in_a_whole_folder(tmp_path: Path) -> None:
     run = [sys.executable, "-m", "bt_tamp", "run", "fig2", "--out", str(tmp_path / "run")]
     process = subprocess.Popen(run, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
