@@ -110,7 +110,7 @@ def test_the_story_of_a_run_can_be_told(cut_short: Path, capsys: pytest.CaptureF
     assert "The run gave up: 0.8 s of simulated time have passed." in told
 
 
-@pytest.mark.parametrize("form", ["ascii", "unicode", "dot", "svg"])
+@pytest.mark.parametrize("form", ["ascii", "unicode", "dot", "svg", "html"])
 def test_the_last_tree_of_a_run_is_shown(form: str, cut_short: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tree", str(cut_short), "--format", form]) == 0
     shown = capsys.readouterr().out
