@@ -12,17 +12,14 @@ import numpy as np
 from PIL import Image, ImageChops, ImageFilter
 
 from scenarios.scenario import Scenario
-from scenarios.shapes import Box, extents
-from sim.render_camera import VIEW_FROM, Camera
+from scenarios.shapes import Box, bounding_radius, extents
+from sim.render_camera import VIEW_FROM, Camera, Window
 from sim.render_egl import egl_is_faster
-from sim.render_stage import ArmOnStage, Engine, Stage, add_room
+from sim.render_stage import LIGHT_FROM, LINK_REACH, ArmOnStage, Engine, Stage, add_room
 
 WIDTH, HEIGHT = 1280, 720
 ARM_HEIGHT = 0.85
 """Metres above the base up to which the camera shows the arm."""
-
-LIGHT_FROM = np.array([-0.45, -0.75, 2.0])
-"""Direction from the scene to the light, in W."""
 
 LIGHT_SIZE = 560
 BIAS = np.float32(0.012)
@@ -74,6 +71,7 @@ class Renderer:
         self._bodies = {
             name: self._stage.add(body.shape, body.X_WO, body.color) for name, body in scenario.bodies.items()
         }
+        self._radii = {name: bounding_radius(body.shape) for name, body in scenario.bodies.items()}
         self._robot = ArmOnStage(self._stage, scenario)
 
     def __enter__(self) -> "Renderer":
@@ -88,26 +86,40 @@ class Renderer:
         """Free the engine. The renderer can't be used afterwards."""
         self._stage.close()
 
-    def picture(self, q: np.ndarray, opening: float, poses: Mapping[str, np.ndarray]) -> np.ndarray:
+    def picture(
+        self, q: np.ndarray, opening: float, poses: Mapping[str, np.ndarray], window: Window | None = None
+    ) -> np.ndarray:
         """Pixels (height, width, 3) uint8 of a state: q (7,) rad, opening in m, poses (7,) as position and
-        quaternion xyzw in W by body."""
+        quaternion xyzw in W by body. `window`: where something that moves may be seen (None: found out)."""
         self._robot.put(q, opening)
         for name, pose in poses.items():
             self._stage.put(self._bodies[name], pose)
-        front, distance = self._stage.look(self.camera)
-        is_front = distance < self._ground.distance
-        picture = np.where(is_front[:, :, None], front, self._ground.colours)
-        return shaded(picture, self._shadow(distance, is_front))
+        left, top, width, height = window = window or self.window(q, opening, poses)
+        here = np.s_[top : top + height, left : left + width]
+        front, distance = self._stage.look(self.camera, window)
+        is_front = distance < self._ground.distance[here]
+        picture = self._ground.colours.copy()
+        picture[here][is_front] = front[is_front]
+        rows, columns = np.nonzero(is_front)
+        shown = (rows + top) * self.camera.width + columns + left
+        return shaded(picture, self._shadow(shown, distance[is_front]))
 
-    def _shadow(self, distance: np.ndarray, is_front: np.ndarray) -> np.ndarray:
-        """Which pixels (height, width) lie behind something, as the light sees it?"""
+    def window(self, q: np.ndarray, opening: float, poses: Mapping[str, np.ndarray]) -> Window:
+        """The part of the picture that shows the arm and the bodies."""
+        links = self._robot.places(q, opening)
+        centres = np.vstack([links, *(pose[:3] for pose in poses.values())])
+        radii = [LINK_REACH] * len(links) + [self._radii[name] for name in poses]
+        return self.camera.window(centres, np.array(radii))
+
+    def _shadow(self, shown: np.ndarray, distance: np.ndarray) -> np.ndarray:
+        """Which pixels (height, width) lie behind something, as the light sees it? Pixels `shown` (n,) show
+        something that moves, at `distance` (n,) in metres ahead of the camera."""
         from_light = np.minimum(self._ground.from_light, self._stage.look(self._light)[1].ravel())
         shadow = from_light[self._ground_index] < self._ground_lit - BIAS
-        shown = np.flatnonzero(is_front)
-        points = self._rays[shown] * distance.ravel()[shown, None] + self.camera.eye.astype(np.float32)
+        points = self._rays[shown] * distance[:, None] + self.camera.eye.astype(np.float32)
         index, away = self._light.look_up(points)
         shadow[shown] = from_light[index] < away - BIAS
-        return shadow.reshape(is_front.shape)
+        return shadow.reshape(self.camera.height, self.camera.width)
 
 
 def shaded(picture: np.ndarray, shadow: np.ndarray) -> np.ndarray:

@@ -8,6 +8,9 @@ NEAR, FAR = 0.1, 12.0
 RIM = 0.03
 """Part of the picture kept free on every side."""
 
+Window = tuple[int, int, int, int]
+"""A part of a picture in pixels: left, top, width, height."""
+
 VIEW_FROM = np.array([0.74, -0.62, 0.60])
 """Direction from the scene to the camera in the robot's base axes: in front, to its right, from above."""
 
@@ -55,6 +58,28 @@ class Camera:
         x = self.width / 2 + seen[:, 0] / distance / self.tan_half * half
         y = half - seen[:, 1] / distance / self.tan_half * half
         return np.column_stack([x, y])
+
+    def window(self, centres_W: np.ndarray, radii: np.ndarray) -> Window:
+        """The part of the picture that shows balls at centres (n,3) in W with radii (n,) in metres."""
+        seen = (centres_W - self.eye) @ self.R_WC
+        nearest = np.maximum(-seen[:, 2] - radii, NEAR)
+        reach = (radii / nearest / self.tan_half * self.height / 2)[:, None]
+        pixels = self.project(centres_W)
+        size = np.array([self.width, self.height])
+        inside = np.isfinite(pixels).all(axis=1)
+        if not inside.any():
+            return 0, 0, self.width, self.height
+        left, top = np.clip((pixels - reach)[inside].min(axis=0), 0, size - 16).astype(int)
+        right, bottom = np.clip((pixels + reach)[inside].max(axis=0) + 1, (left + 16, top + 16), size).astype(int)
+        return int(left), int(top), int(right - left), int(bottom - top)
+
+    def projection_of(self, window: Window) -> np.ndarray:
+        """(4,4) like `projection`, for a part of the picture alone."""
+        left, top, width, height = window
+        cut = np.eye(4)
+        cut[0, 0], cut[0, 3] = self.width / width, (self.width - 2 * left - width) / width
+        cut[1, 1], cut[1, 3] = self.height / height, (height - self.height + 2 * top) / height
+        return cut @ self.projection
 
     def rays(self) -> np.ndarray:
         """Points (height * width, 3) one metre in front of the camera, one for each pixel, less the eye, in W."""

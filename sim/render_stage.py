@@ -16,7 +16,7 @@ from scenarios.regions import parts
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, Cylinder, Shape, Sphere
 from sim.bullet import resolved_urdf
-from sim.render_camera import Camera, distances
+from sim.render_camera import Camera, Window, distances
 from sim.render_egl import load_egl
 from sim.robot import RobotModel
 from sim.scene import floor_height, pedestal
@@ -29,7 +29,11 @@ LEGS: Color = (0.58, 0.46, 0.34, 1.0)
 CONTAINERS: Mapping[str, Color] = {"bin": (0.53, 0.63, 0.73, 1.0), "dustpan": (0.66, 0.42, 0.60, 1.0)}
 LEG = 0.05
 FLOOR_SIZE = 14.0
-LIGHT = [-0.45, -0.75, 2.0]
+LINK_REACH = 0.26
+"""Metres from a link's origin to its farthest point, with some to spare."""
+
+LIGHT_FROM = np.array([-0.45, -0.75, 2.0])
+"""Direction from the scene to the light, in W."""
 
 Engine = Literal["egl", "tiny"]
 
@@ -74,14 +78,18 @@ class Stage:
         """Move a shape to a pose (7,): position and quaternion xyzw in W."""
         p.resetBasePositionAndOrientation(number, pose[:3].tolist(), pose[3:].tolist(), physicsClientId=self.client)
 
-    def look(self, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-        """Colours (height, width, 3) uint8 and distances (height, width) in metres ahead of the camera."""
+    def look(self, camera: Camera, window: Window | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Colours (height, width, 3) uint8 and distances (height, width) in metres ahead of the camera.
+
+        window: the part of the picture that is wanted.
+        """
+        _, _, width, height = window = window or (0, 0, camera.width, camera.height)
         seen = p.getCameraImage(
-            camera.width,
-            camera.height,
+            width,
+            height,
             camera.view.T.ravel().tolist(),
-            camera.projection.T.ravel().tolist(),
-            lightDirection=LIGHT,
+            camera.projection_of(window).T.ravel().tolist(),
+            lightDirection=LIGHT_FROM.tolist(),
             lightColor=[1.0, 1.0, 1.0],
             lightAmbientCoeff=0.62,
             lightDiffuseCoeff=0.42,
@@ -91,8 +99,8 @@ class Stage:
             renderer=p.ER_BULLET_HARDWARE_OPENGL if self.engine == "egl" else p.ER_TINY_RENDERER,
             physicsClientId=self.client,
         )
-        colours = np.asarray(seen[2], dtype=np.uint8).reshape(camera.height, camera.width, 4)[:, :, :3]
-        depth = np.asarray(seen[3], dtype=np.float32).reshape(camera.height, camera.width)
+        colours = np.asarray(seen[2], dtype=np.uint8).reshape(height, width, 4)[:, :, :3]
+        depth = np.asarray(seen[3], dtype=np.float32).reshape(height, width)
         return colours, distances(depth)
 
 
@@ -100,7 +108,7 @@ class ArmOnStage:
     """The robot, to be put into any configuration."""
 
     def __init__(self, stage: Stage, scenario: Scenario) -> None:
-        robot = RobotModel(scenario.robot.model, scenario.robot.X_WB)
+        self._model = robot = RobotModel(scenario.robot.model, scenario.robot.X_WB)
         pose = pin.SE3ToXYZQUAT(scenario.robot.X_WB)
         self._client = stage.client
         with resolved_urdf(robot) as path:
@@ -111,6 +119,10 @@ class ArmOnStage:
         kinds = {joint: p.getJointInfo(self._robot, joint, physicsClientId=self._client)[2] for joint in joints}
         self._arm = [joint for joint, kind in kinds.items() if kind == p.JOINT_REVOLUTE]
         self._fingers = [joint for joint, kind in kinds.items() if kind == p.JOINT_PRISMATIC]
+
+    def places(self, q: np.ndarray, opening: float) -> np.ndarray:
+        """Origins (n,3) in W of the links at q (7,); each link lies within LINK_REACH of its own."""
+        return np.array([X_WL.translation for X_WL in self._model.link_poses(q, opening).values()])
 
     def put(self, q: np.ndarray, opening: float) -> None:
         """Set the arm to q (7,) in rad, the fingers `opening` metres apart."""
