@@ -124,6 +124,17 @@ class RobotModel:
         return poses
 
     @cached_property
+    def shoulder(self) -> np.ndarray:
+        """Centre (3,) of the shoulder in W, where the first two axes meet, in metres."""
+        pin.framesForwardKinematics(self.model, self._data, np.zeros(7))
+        return self._data.oMi[2].translation.copy()
+
+    @cached_property
+    def reach(self) -> float:
+        """Greatest distance in metres of the gripper frame's origin from the shoulder: the arm stretched out."""
+        return float(np.linalg.norm(self.X_WG(np.zeros(7)).translation - self.shoulder))
+
+    @cached_property
     def X_EG(self) -> SE3:
         """Pose of the gripper frame in the flange frame."""
         return self.model.frames[self.flange_id].placement.actInv(self.model.frames[self.tcp_id].placement)

@@ -18,7 +18,7 @@ from sim.scene import Held, SceneState, half_height
 from skills.conditions import Achieved
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, Refine, Slide, Touch, sequence
-from skills.skill import MAX_PATHS, Toolkit, Unfit, refine_by_sampling
+from skills.skill import Toolkit, Unfit, paths_through, refine_by_sampling
 from skills.waypoints import raised, shifted
 
 HEIGHT = 0.08
@@ -188,7 +188,7 @@ class Drag:
             X_WG_end,
             raised(X_WG_end, HEIGHT),
         )
-        for path in motion.legs(waypoints, scene.q)[:MAX_PATHS]:
+        for path in paths_through(self._kit, waypoints, scene.q):
             down, near, probe, _, along, up = path
             moved = closed.moved(name, shifted(X_WO, X_WG_end.translation - X_WG_press.translation))
             failure = (

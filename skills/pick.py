@@ -11,12 +11,15 @@ from planner.grasps import Grasp, grasps, open_width, tool_grasps
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Body
+from scenarios.shapes import bounding_radius
+from sim.robot import GRAVITY
 from sim.scene import Held, SceneState
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Close, Follow, Refine, guarded, sequence
-from skills.skill import MAX_PATHS, Toolkit, Unfit, refine_by_sampling
+from skills.skill import Toolkit, Unfit, paths_through, refine_by_sampling
 from skills.waypoints import back_off, raised
+from skills.weigh import Weigh
 
 STANDOFF = 0.08
 LIFT = 0.10
@@ -44,6 +47,10 @@ class Pick:
     def refine(
         self, action: GroundAction, scene: SceneState, rng: np.random.Generator, budget: Budget, hints: Hints
     ) -> Refinement | RefinementFailure:
+        impossible = self._impossible(action, scene)
+        if impossible is not None:
+            return impossible
+
         def attempt(grasp: Grasp, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
             return self._attempt(action, grasp, world)
 
@@ -67,8 +74,24 @@ class Pick:
             Follow("approach", run, context),
             Close("close", run, context),
             guarded("hold", HandHolds(name, run, context), Follow("lift", run, context)),
+            Weigh(run, context),
             Achieved(lambda scene: scene.held is not None and scene.held.name == name, run, context),
         )
+
+    def _impossible(self, action: GroundAction, scene: SceneState) -> RefinementFailure | None:
+        """What no sample can help: an object beyond the stretched arm, or heavier than the fingers can hold."""
+        name, robot = action.args[0], self._kit.robot
+        body = scene.scenario.bodies[name]
+        distance = float(np.linalg.norm(scene.poses[name].translation - robot.shoulder))
+        reach = robot.reach + bounding_radius(body.shape)
+        if distance > reach:
+            reason = f"{name} lies {distance:.2f} m from the shoulder, the arm reaches {reach:.2f} m"
+            return RefinementFailure(action, reason, proof="here")
+        liftable = 2 * robot.gripper.pad_friction * body.friction * robot.gripper.max_force / GRAVITY
+        if body.mass > liftable:
+            reason = f"{name} weighs {body.mass:.2f} kg, the fingers' friction holds {liftable:.2f} kg"
+            return RefinementFailure(action, reason, proof="anywhere")
+        return None
 
     def _grasps(self, name: str, scene: SceneState, rng: np.random.Generator) -> Iterator[Grasp]:
         body = scene.scenario.bodies[name]
@@ -93,7 +116,7 @@ class Pick:
         grasped = replace(scene, opening=grasp.width, held=Held(name, grasp.X_OG.inverse()))
         resting = touching | pairs(name, place)
         failure: MotionFailure | None = None
-        for path in motion.legs((back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT)), scene.q)[:MAX_PATHS]:
+        for path in paths_through(self._kit, (back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT)), scene.q):
             into, out = path
             failure = motion.line_is_free(ready, into, touching) or motion.line_is_free(grasped, out, resting)
             if failure:

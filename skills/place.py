@@ -17,7 +17,7 @@ from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, Refine, guarded, sequence
-from skills.skill import MAX_PATHS, Toolkit, Unfit, refine_by_sampling
+from skills.skill import Toolkit, Unfit, paths_through, refine_by_sampling
 from skills.waypoints import back_off, raised
 
 STANDOFF = 0.12
@@ -93,7 +93,7 @@ class Place:
         released = replace(scene.moved(name, placement.X_WO), held=None, opening=opening)
         leaving = lowering | pairs(robot.hand_links, name)
         failure: MotionFailure | None = None
-        for path in motion.legs((raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT)), scene.q)[:MAX_PATHS]:
+        for path in paths_through(self._kit, (raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT)), scene.q):
             into, out = path
             failure = motion.line_is_free(scene, into, lowering) or motion.line_is_free(released, out, leaving)
             if failure:

@@ -4,11 +4,12 @@ A skill turns an action into motion (`refine`), says what the motion changes (`p
 behaviour tree that carries it out (`subtree`). One primitive, one file.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
+from pinocchio import SE3
 from py_trees.behaviour import Behaviour
 
 from planner.failure import Blocked, MotionFailure, RefinementFailure
@@ -22,6 +23,9 @@ from skills.control.reference import Mode
 
 MAX_PATHS = 4
 """Joint paths (arm branches) of one sample that are tried, best first."""
+
+AMPLE = 0.2
+"""Rad from every joint limit beyond which a path is as good as any other."""
 
 UNCOUNTED = 30
 """Samples that may fail before any motion is sought, for each try that counts."""
@@ -69,6 +73,19 @@ class Unfit:
 
     reason: str
     culprits: frozenset[str] = frozenset()
+
+
+def paths_through(toolkit: Toolkit, waypoints: Sequence[SE3], q: np.ndarray) -> list[list[np.ndarray]]:
+    """Joint paths through poses X_WG of the hand, cut at them into legs (n,7): those clear of the joint limits
+    first, among them those that begin near q (7,), so that what is held is not tumbled on the way there."""
+    robot = toolkit.robot
+
+    def rank(legs: list[np.ndarray]) -> tuple[bool, float]:
+        path = np.concatenate(legs)
+        margin = float(np.minimum(path - robot.q_min, robot.q_max - path).min())
+        return margin < AMPLE, float(np.max(np.abs(path[0] - q) / robot.v_max))
+
+    return sorted(toolkit.motion.legs(waypoints, q), key=rank)[:MAX_PATHS]
 
 
 Attempt = Callable[[Any, SceneState], "tuple[Phase, ...] | MotionFailure | Unfit"]

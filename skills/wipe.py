@@ -23,7 +23,7 @@ from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Refine, Slide, Touch, guarded, sequence
-from skills.skill import MAX_PATHS, Toolkit, Unfit, refine_by_sampling
+from skills.skill import Toolkit, Unfit, paths_through, refine_by_sampling
 from skills.waypoints import raised, shifted
 
 HEIGHT = 0.08
@@ -207,7 +207,7 @@ class Wipe:
             X_WG_end,
             raised(X_WG_end, HEIGHT),
         )
-        for path in motion.legs(waypoints, scene.q)[:MAX_PATHS]:
+        for path in paths_through(self._kit, waypoints, scene.q):
             down, near, probe, _, along, up = path
             failure = (
                 motion.line_is_free(pressed, along, touching)

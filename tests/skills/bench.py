@@ -75,6 +75,13 @@ class Bench:
     def scene(self) -> SceneState:
         return self.context.scene
 
+    def belief_mass(self, name: str, mass: float) -> None:
+        """Have everything above the plant believe that a body has another mass than it truly has."""
+        bodies = self.plant.scenario.bodies
+        believed = replace(self.plant.scenario, bodies={**bodies, name: replace(bodies[name], mass=mass)})
+        self._belief = Belief(believed, self.robot)
+        self.context.scene = self._belief.update(self.context.observation, False)
+
     def refine(self, what: GroundAction) -> Refinement | RefinementFailure:
         return self.skills[what.name].refine(what, self.scene, self._rng, Budget(), Hints())
 

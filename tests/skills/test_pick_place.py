@@ -1,5 +1,7 @@
 """Pick and place, carried out in PyBullet."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bench import Bench, action, scene_with, with_pose
@@ -45,11 +47,14 @@ def test_a_flat_book_has_no_grasp_as_it_lies_and_nothing_movable_is_to_blame():
     assert "table" in failure.reason
 
 
-def test_a_box_between_two_others_is_blocked_by_them():
-    scenario = scene_with("box", "book")
-    crowded = with_pose(scenario, "box", 0.6, 0.0)
-    bench = Bench(crowded)
-    assert not isinstance(bench.refine(action("pick(box, table)")), RefinementFailure)
+def test_what_weighs_other_than_declared_is_told_as_a_missed_grasp():
+    bench = Bench(scene_with("box"))
+    true_mass = bench.scene.scenario.bodies["box"].mass
+    bench.belief_mass("box", true_mass + 0.5)
+    assert bench.do("pick(box, table)") is Status.FAILURE
+    assert bench.context.failure is not None
+    assert bench.context.failure.kind == "GraspMissed"
+    assert "weighs" in bench.context.failure.reason
 
 
 def test_closing_on_nothing_is_told_as_a_missed_grasp():
@@ -57,10 +62,20 @@ def test_closing_on_nothing_is_told_as_a_missed_grasp():
     what = action("pick(box, table)")
     found = bench.refine(what)
     assert not isinstance(found, RefinementFailure)
-    bench.context.refine = lambda _: (found, 0.0)
-    gone = with_pose(scene_with("box"), "box", 0.5, 0.3)
-    elsewhere = Bench(gone)
+    elsewhere = Bench(with_pose(scene_with("box"), "box", 0.5, 0.3))
     elsewhere.context.refine = lambda _: (found, 0.0)
     assert elsewhere.do("pick(box, table)") is Status.FAILURE
     assert elsewhere.context.failure is not None
     assert elsewhere.context.failure.kind == "GraspMissed"
+
+
+def test_what_is_out_of_reach_or_too_heavy_is_proven_so():
+    far = Bench(with_pose(scene_with("box"), "box", 1.6, 0.0)).refine(action("pick(box, table)"))
+    assert isinstance(far, RefinementFailure)
+    assert far.proof == "here"
+    scenario = scene_with("box")
+    heavy = replace(scenario, bodies={"box": replace(scenario.bodies["box"], mass=30.0)})
+    failure = Bench(heavy).refine(action("pick(box, table)"))
+    assert isinstance(failure, RefinementFailure)
+    assert failure.proof == "anywhere"
+    assert "30.00 kg" in failure.reason
