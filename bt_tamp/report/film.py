@@ -146,5 +146,5 @@ def set_points(signals: Signals, row: int) -> Path3 | None:
     spell = signals.p_ref[start:end]
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(spell, axis=0), axis=1))])
     wanted = np.arange(0.0, way[-1] + 1e-9, DOT_SPACING)
-    points = spell[np.minimum(np.searchsorted(way, wanted), len(spell) - 1)]
-    return Path3(points, int(np.searchsorted(wanted, way[row - start], side="right")))
+    points = np.column_stack([np.interp(wanted, way, axis) for axis in spell.T])
+    return Path3(points, int(np.searchsorted(wanted, way[row - start] + 1e-9, side="right")))

@@ -22,20 +22,25 @@ from sim.render import HEIGHT, WIDTH, Backdrop, Engine, Renderer
 from sim.render_egl import egl_is_faster
 from sim.robot import RobotModel
 
-BUDGET_S = 28.0
-"""Seconds that the pictures should take at most, by the first ones; it decides how many there are. Half a
-minute is left for a machine that becomes slower."""
+BUDGET_S = 20.0
+"""Seconds that the pictures should take at most, by the first ones; it decides how many there are. Start-up and
+a machine on which others work as well take as much again, or twice that."""
 
 WORKERS = 4
 RATE = 25
-PACES = ((1, 25), (2, 25), (3, 25), (4, 25), (4, 15), (4, 10), (5, 10), (6, 10), (8, 10), (8, 5), (16, 5), (32, 5))
-"""Speed (robot seconds a film second) and pictures a film second, from most pictures to fewest."""
+PACES = (
+    *((1, 1), (2, 1), (3, 1), (4, 1), (5, 1), (6, 1)),
+    *((4, 2), (5, 2), (6, 2), (8, 2), (8, 3), (16, 3), (32, 5)),
+)
+"""Speed (robot seconds a film second), and for how many of RATE's ticks a picture stands; most pictures first."""
 
 READING_S, READING_MORE_S = 1.6, 0.9
 """Film seconds for which the film stands still to let a sentence, and each further one, be read."""
 
 END_S = 1.5
 BATCH = 6
+FEW = 12
+"""Up to so many pictures, starting other processes takes longer than it gains."""
 
 
 def render_run(folder: Path, out: Path | None = None, progress: Callable[[int, int], None] | None = None) -> Path:
@@ -73,10 +78,9 @@ def shots_of(recording: Recording, cost: float) -> list[tuple[Shot, int]]:
     The first of PACES is taken that keeps within BUDGET_S, or else the last.
     """
     duration = recording.duration
-    fitting = (pace for pace in PACES if duration / pace[0] * pace[1] * cost <= BUDGET_S)
-    speed, rate = next(fitting, PACES[-1])
-    step = speed / rate
-    hold = RATE // rate
+    fitting = (pace for pace in PACES if duration * RATE / (pace[0] * pace[1]) * cost <= BUDGET_S)
+    speed, hold = next(fitting, PACES[-1])
+    step = speed * hold / RATE
     shots: list[tuple[Shot, int]] = []
     before = -np.inf
     for number in range(int(np.ceil(duration / step)) + 1):
@@ -125,7 +129,7 @@ def _cost(filming: Filming) -> float:
 
 
 def _pictures(folder: Path, filming: Filming, shots: list[tuple[Shot, int]], workers: int) -> Iterator[np.ndarray]:
-    if workers == 1:
+    if workers == 1 or len(shots) <= FEW:
         yield from (filming.take(shot) for shot, _ in shots)
         return
     batches = [[shot for shot, _ in shots[start : start + BATCH]] for start in range(0, len(shots), BATCH)]
