@@ -74,45 +74,50 @@ def surface_of(place: Region | Table) -> Surface:
 
 
 def placements(
-    shape: Shape, X_GO: SE3, place: Region | Table, rng: np.random.Generator, spots: int = 6
+    shape: Shape, held: tuple[SE3, SE3], place: Region | Table, rng: np.random.Generator, spots: int = 6
 ) -> Iterator[Placement]:
-    """Placements of an object held at X_GO, the least tilted first, `spots` random positions for each direction.
+    """Placements of an object that is held at X_GO with the hand at X_WG, `held` = (X_WG, X_GO).
+
+    The least tilted come first, among them those that turn the object the least on the way, and
+    `spots` random positions for each direction.
 
     The object gets a face down on which it stands firmly; tilting turns it with the hand towards
     pointing straight down. Overlap with other things is
     not looked at here.
     """
     surface = surface_of(place)
-    uprights = _uprights(shape, X_GO)
+    X_WG, X_GO = held
+    R_WO = X_WG.rotation @ X_GO.rotation
     tilts = TILTS[:1] if surface.wall == 0.0 else TILTS
     for tilt in tilts:
+        found = [
+            (firmness, -float(np.trace(R_WO.T @ R_target)), R_target)
+            for firmness, R_upright in enumerate(_uprights(shape, X_GO))
+            for yaw in YAWS
+            if (R_target := _turned(R_upright, X_GO, float(tilt), float(yaw), surface)) is not None
+        ]
+        found.sort(key=lambda way: way[:2])
         for _ in range(spots):
-            for yaw in rng.permutation(YAWS):
-                for R_upright in uprights:
-                    placement = _placement(shape, X_GO, surface, R_upright, (float(tilt), float(yaw)), rng)
-                    if placement is not None:
-                        yield placement
+            for _, _, R_target in found:
+                placement = _placement(shape, surface, R_target, rng)
+                if placement is not None:
+                    yield placement
 
 
-def _placement(
-    shape: Shape,
-    X_GO: SE3,
-    surface: Surface,
-    R_upright: np.ndarray,
-    turn: tuple[float, float],
-    rng: np.random.Generator,
-) -> Placement | None:
-    tilt, yaw = turn
+def _turned(R_upright: np.ndarray, X_GO: SE3, tilt: float, yaw: float, surface: Surface) -> np.ndarray | None:
+    """R_WO of an upright object turned by `yaw` and tilted with the hand; None if that points the hand past down."""
     R_WO = R_upright
     approach = R_WO @ X_GO.rotation.T[:, 2]
-    level = approach.copy()
-    level[2] = 0.0
+    level = approach * np.array([1.0, 1.0, 0.0])
     if tilt > 0.0:
         if np.linalg.norm(level) < np.sin(tilt - OVERTILT):
             return None
         axis = np.cross(level / np.linalg.norm(level), np.array([0.0, 0.0, -1.0]))
         R_WO = pin.exp3(axis / np.linalg.norm(axis) * tilt) @ R_WO
-    R_WO = surface.X_WS.rotation @ pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ R_WO
+    return surface.X_WS.rotation @ pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ R_WO
+
+
+def _placement(shape: Shape, surface: Surface, R_WO: np.ndarray, rng: np.random.Generator) -> Placement | None:
     R_SO = surface.X_WS.rotation.T @ R_WO
     footprint = np.abs(R_SO)[:2] @ extents(shape) / 2
     room = surface.half - footprint - (WALL_GAP if surface.wall > 0.0 else EDGE_GAP)

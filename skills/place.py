@@ -54,7 +54,8 @@ class Place:
             return self._attempt(action, placement, world)
 
         shape = scene.scenario.bodies[name].shape
-        samples = placements(shape, scene.held.X_GO, place_named(scene.scenario, goal), rng)
+        holding = (self._kit.robot.X_WG(scene.q), scene.held.X_GO)
+        samples = placements(shape, holding, place_named(scene.scenario, goal), rng)
         return refine_by_sampling(action, scene, samples, attempt, budget, hints)
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:

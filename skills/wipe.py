@@ -107,9 +107,8 @@ def strokes(crumb: Shape, p_WO: np.ndarray, tool: Shape, pan: Region, rng: np.ra
         if way @ entry.inward <= 0.0:
             continue
         for lateral in laterals:
-            for flipped in (False, True):
-                cost = slant + 8.0 * abs(lateral) + 0.05 * rng.random()
-                found.append((cost, len(found), Stroke(direction, float(lateral), flipped)))
+            cost = slant + 8.0 * abs(lateral) + 0.05 * rng.random()
+            found.append((cost, len(found), Stroke(direction, float(lateral))))
     found.sort(key=lambda entry: entry[:2])
     for _, _, stroke in found:
         yield stroke
@@ -136,13 +135,15 @@ class Wipe:
         def attempt(stroke: Stroke, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
             return self._attempt(action, stroke, world)
 
-        samples = strokes(
+        ways = strokes(
             bodies[crumb].shape,
             np.array(scene.poses[crumb].translation),
             bodies[held.name].shape,
             scene.scenario.regions[pan],
             rng,
         )
+        R_WO = self._kit.robot.X_WG(scene.q).rotation @ held.X_GO.rotation
+        samples = (turned for way in ways for turned in _either_way_round(way, scene.scenario, held, R_WO))
         return refine_by_sampling(action, scene, samples, attempt, budget, hints)
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
@@ -237,6 +238,13 @@ class Wipe:
                 Phase("retract", "approach", motion.time_line(up, NEAR_SPEED), scene.opening, held, sweeping),
             )
         return failure or Unfit("the arm can't follow the stroke")
+
+
+def _either_way_round(stroke: Stroke, scenario: Scenario, held: Held, R_WO: np.ndarray) -> list[Stroke]:
+    """The stroke and the same with the sponge turned half round, the one nearer to the sponge's present R_WO first:
+    a soft thing turns in the hand when it is swung about."""
+    ways = [stroke, replace(stroke, flipped=True)]
+    return sorted(ways, key=lambda way: -float(np.trace(R_WO.T @ _broadside(scenario, held, way)[0])))
 
 
 def stroke_ends(scene: SceneState, held: Held, crumb: str, stroke: Stroke, pan: Region) -> tuple[SE3, SE3]:
