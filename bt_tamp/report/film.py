@@ -51,8 +51,8 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """Robot time in seconds."""
-        return float(self.signals.t[-1])
+        """Robot time in seconds, up to the last thing that is told."""
+        return max(float(self.signals.t[-1]), self.timeline.end)
 
 
 class Filming:

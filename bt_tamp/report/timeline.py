@@ -55,6 +55,11 @@ class Timeline:
         notes = (Note(t, _fewer(sentences)) for t, sentences in sorted(told.items()))
         return Timeline(tuple(times), tuple(captions), tuple(notes))
 
+    @property
+    def end(self) -> float:
+        """Time in seconds of the last thing that is told."""
+        return max([self.times[-1], *(note.t for note in self.notes)])
+
     def caption(self, t: float) -> Caption:
         """The caption at time t (s)."""
         return self.captions[max(0, bisect_right(self.times, t) - 1)]

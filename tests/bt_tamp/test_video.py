@@ -57,7 +57,7 @@ def signals_of(scenario, path, seconds: float, contact_from: float = 0.3, contac
 @pytest.fixture
 def folder(tmp_path, scenario):
     (tmp_path / SCENARIO).write_text(scenario_to_json(scenario))
-    (tmp_path / EVENTS).write_text("\n".join(event.to_line() for event in EVENTS_OF_A_RUN) + "\n")
+    (tmp_path / EVENTS).write_text("\n".join(event.to_line() for event in EVENTS_OF_A_RUN[:5]) + "\n")
     signals_of(scenario, tmp_path / SIGNALS, 0.2)
     return tmp_path
 
@@ -151,6 +151,11 @@ def test_the_film_stands_still_while_something_is_told(scenario, tmp_path):
     shots = shots_of(Recording(scenario, signals, Timeline.of(EVENTS_OF_A_RUN)), 1e-6)
     held = [shot for shot, repeats in shots[:-1] if repeats > RATE]
     assert [shot.told[0] for shot in held] == ["learned: book cannot be grasped as it lies", "goal reached"]
+
+
+def test_what_is_told_after_the_last_sample_still_ends_the_film(scenario, tmp_path):
+    recording = Recording(scenario, signals_of(scenario, tmp_path / "s.npz", 0.5), Timeline.of(EVENTS_OF_A_RUN))
+    assert shots_of(recording, 1e-6)[-1][0].told == ("goal reached",)
 
 
 def test_a_film_is_h264_with_every_picture_as_often_as_its_shot_says(tmp_path):
