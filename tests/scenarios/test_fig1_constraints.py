@@ -21,7 +21,7 @@ from sim.robot import RobotModel
 
 SEEDS = range(8)
 ANGLES = np.radians(np.arange(-60, 61, 3))
-OFFSETS = np.linspace(-0.045, 0.045, 7)
+OFFSETS = np.linspace(-0.04, 0.04, 7)
 GRIP_HEIGHT = 0.015
 CLEARANCE = 0.003
 
