@@ -108,7 +108,7 @@ class BulletPlant:
             opening=fingers[0][0] + fingers[1][0],
             opening_velocity=fingers[0][1] + fingers[1][1],
             grip_force=(abs(fingers[0][3]) + abs(fingers[1][3])) / 2,
-            wrist=Wrench(force, -np.array(sensor[3:]) + np.cross(self._hand_centre, force)),
+            wrist=Wrench(force, self._lever @ force - np.array(sensor[3:])),
             poses=poses,
             velocities=velocities,
         )
@@ -278,7 +278,7 @@ class BulletPlant:
         self._sensor_joint = index["wrist_sensor"]
         self._tcp_link = index["tcp_mount"]
         hand = p.getDynamicsInfo(self._robot, self._sensor_joint, physicsClientId=self._client)
-        self._hand_centre = np.array(hand[3])
+        self._lever = pin.skew(np.array(hand[3]))
         self._tau = np.zeros(7)
         self._tau_max = robot.tau_max
         self._max_grip_force = robot.gripper.max_force

@@ -19,8 +19,8 @@ from planner.task.facts import place_of
 from scenarios.scenario import Scenario
 from sim.plant import Command
 
-AUDIT_EVERY = 5
-"""Control ticks between two looks at the true contacts: 100 Hz."""
+SAMPLE_EVERY = 5
+"""Control ticks between two samples of the signals and two looks at the true contacts: 100 Hz."""
 
 MAX_REPLANS = 25
 MAX_ACTIONS = 200
@@ -106,12 +106,12 @@ def _account(machine: Machine, recorder: RunRecorder, audit: ContactAudit, tally
     tally.peak_force_n = max(tally.peak_force_n, force)
     power = np.abs(observation.tau * observation.v).sum()
     tally.energy_j += float(power) * CONTROL_EVERY * machine.plant.timestep
-    reference = controller.reference
-    wanted = reference.force if reference else 0.0
-    q_ref = reference.trajectory.at(controller.time_in_reference)[0] if reference else observation.q
-    p_ref = machine.robot.X_WG(q_ref).translation if wanted else None
-    recorder.sample(observation, Reference(q_ref, p_ref, wanted), force)
-    if tick % AUDIT_EVERY == 0:
+    if tick % SAMPLE_EVERY == 0:
+        reference = controller.reference
+        wanted = reference.force if reference else 0.0
+        q_ref = reference.trajectory.at(controller.time_in_reference)[0] if reference else observation.q
+        p_ref = machine.robot.X_WG(q_ref).translation if wanted else None
+        recorder.sample(observation, Reference(q_ref, p_ref, wanted), force)
         contacts = machine.plant.contacts()
         running = str(machine.agenda.running or "planning")
         audit.look(observation.t, contacts, context, running)
