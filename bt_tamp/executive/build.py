@@ -4,13 +4,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from planner.motion.motion_planner import MotionPlanner, MotionSettings
-
 from bt_tamp.executive.agenda import Agenda
 from bt_tamp.executive.belief import Belief
 from bt_tamp.executive.mission import Mission, mission, planning
 from bt_tamp.executive.plan_node import Planner, PlanNode
 from bt_tamp.options import RunOptions
+from planner.motion.motion_planner import MotionPlanner, MotionSettings
 from planner.refinement import Work
 from planner.search_then_sample import PlanSettings, SearchThenSample
 from planner.task.facts import goal_facts
