@@ -7,6 +7,7 @@ tilted so that the hand points down into a container; then it falls the rest of 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 import pinocchio as pin
@@ -30,6 +31,12 @@ LEVEL = 0.1
 
 OVERTILT = np.radians(10.0)
 """Angle by which a tilt may turn the hand past pointing straight down."""
+
+OUTWARDS = 0.4
+"""Exponent below 1 that draws spots towards the walls of a container, so that room is left for what comes later."""
+
+EDGE = 0.002
+"""Metres above the lowest corner within which corners belong to the lowest edge."""
 
 WALL_GAP = 0.005
 EDGE_GAP = 0.01
@@ -82,7 +89,7 @@ def placements(
     `spots` random positions for each direction.
 
     The object gets a face down on which it stands firmly; tilting turns it with the hand towards
-    pointing straight down. Overlap with other things is
+    pointing straight down; then there is room for it to fall flat. Overlap with other things is
     not looked at here.
     """
     surface = surface_of(place)
@@ -119,14 +126,16 @@ def _turned(R_upright: np.ndarray, X_GO: SE3, tilt: float, yaw: float, surface: 
 
 def _placement(shape: Shape, surface: Surface, R_WO: np.ndarray, rng: np.random.Generator) -> Placement | None:
     R_SO = surface.X_WS.rotation.T @ R_WO
-    footprint = np.abs(R_SO)[:2] @ extents(shape) / 2
-    room = surface.half - footprint - (WALL_GAP if surface.wall > 0.0 else EDGE_GAP)
+    R_rest, shift = _fallen(shape, R_SO)
+    size = extents(shape) / 2
+    reach = np.maximum(np.abs(R_SO)[:2] @ size, np.abs(R_rest)[:2] @ size + np.abs(shift))
+    room = surface.half - reach - (WALL_GAP if surface.wall > 0.0 else EDGE_GAP)
     if np.any(room < 0.0):
         return None
-    spot = rng.uniform(-room, room)
-    height = half_height(shape, R_SO) + DROP
-    X_WO = surface.X_WS * SE3(R_SO, np.array([spot[0], spot[1], height]))
-    X_rest = surface.X_WS * _fallen(shape, R_SO, spot)
+    along = rng.uniform(-1.0, 1.0, 2)
+    spot = room * (np.sign(along) * np.abs(along) ** OUTWARDS if surface.wall > 0.0 else along)
+    X_WO = surface.X_WS * SE3(R_SO, np.array([*spot, half_height(shape, R_SO) + DROP]))
+    X_rest = surface.X_WS * SE3(R_rest, np.array([*(spot + shift), half_height(shape, R_rest)]))
     return Placement(_numbers(X_WO), _numbers(X_rest))
 
 
@@ -155,15 +164,21 @@ def _turn_down(down_O: np.ndarray) -> np.ndarray:
     return np.vstack([x, np.cross(z, x), z])
 
 
-def _fallen(shape: Shape, R_SO: np.ndarray, spot: np.ndarray) -> SE3:
-    """The resting pose nearest in orientation: the face that is lowest turned fully down."""
+def _fallen(shape: Shape, R_SO: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How a tilted object comes to rest: its lowest face turned fully down about its lowest edge.
+
+    Returns the rotation R_SO at rest and how far the centre moves in the plane (2,), in metres.
+    """
     down_O = -R_SO[2]
     axis = int(np.argmax(np.abs(down_O)))
     flat = _turn_down(np.sign(down_O[axis]) * np.eye(3)[axis])
     delta = R_SO @ flat.T
     yaw = np.arctan2(delta[1, 0] - delta[0, 1], delta[0, 0] + delta[1, 1])
-    R = pin.rpy.rpyToMatrix(0.0, 0.0, float(yaw)) @ flat
-    return SE3(R, np.array([spot[0], spot[1], half_height(shape, R)]))
+    R_rest = pin.rpy.rpyToMatrix(0.0, 0.0, float(yaw)) @ flat
+    corners = np.array(list(product(*((-h, h) for h in extents(shape) / 2))))
+    heights = corners @ R_SO[2]
+    edge = corners[heights < heights.min() + EDGE].mean(axis=0)
+    return R_rest, ((R_SO - R_rest) @ edge)[:2]
 
 
 def _numbers(X: SE3) -> tuple[float, ...]:

@@ -45,10 +45,10 @@ class PlanSettings:
 
     tries: int = 20
     motion_checks: int = 4000
-    max_rounds: int = 30
+    max_rounds: int = 20
     max_expansions: int = 10_000
     backtracks: int = 4
-    widenings: int = 2
+    widenings: int = 1
     search: str = "auto"
 
 

@@ -188,7 +188,7 @@ class Drag:
             X_WG_end,
             raised(X_WG_end, HEIGHT),
         )
-        for path in paths_through(self._kit, waypoints, scene.q):
+        for path in paths_through(self._kit, waypoints, scene):
             down, near, probe, _, along, up = path
             moved = closed.moved(name, shifted(X_WO, X_WG_end.translation - X_WG_press.translation))
             failure = (

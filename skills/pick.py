@@ -116,7 +116,7 @@ class Pick:
         grasped = replace(scene, opening=grasp.width, held=Held(name, grasp.X_OG.inverse()))
         resting = touching | pairs(name, place)
         failure: MotionFailure | None = None
-        for path in paths_through(self._kit, (back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT)), scene.q):
+        for path in paths_through(self._kit, (back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT)), scene):
             into, out = path
             failure = motion.line_is_free(ready, into, touching) or motion.line_is_free(grasped, out, resting)
             if failure:

@@ -94,7 +94,7 @@ class Place:
         released = replace(scene.moved(name, placement.X_WO), held=None, opening=opening)
         leaving = lowering | pairs(robot.hand_links, name)
         failure: MotionFailure | None = None
-        for path in paths_through(self._kit, (raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT)), scene.q):
+        for path in paths_through(self._kit, (raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT)), scene):
             into, out = path
             failure = motion.line_is_free(scene, into, lowering) or motion.line_is_free(released, out, leaving)
             if failure:

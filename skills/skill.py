@@ -75,17 +75,21 @@ class Unfit:
     culprits: frozenset[str] = frozenset()
 
 
-def paths_through(toolkit: Toolkit, waypoints: Sequence[SE3], q: np.ndarray) -> list[list[np.ndarray]]:
-    """Joint paths through poses X_WG of the hand, cut at them into legs (n,7): those clear of the joint limits
-    first, among them those that begin near q (7,), so that what is held is not tumbled on the way there."""
-    robot = toolkit.robot
+def paths_through(toolkit: Toolkit, waypoints: Sequence[SE3], scene: SceneState) -> list[list[np.ndarray]]:
+    """Joint paths through poses X_WG of the hand, cut at them into legs (n,7), best first.
+
+    Those clear of the joint limits come first, among them those that begin near the arm and near
+    its start posture: changes of posture on the way would tumble what is held.
+    """
+    robot, home = toolkit.robot, scene.scenario.robot.q0
 
     def rank(legs: list[np.ndarray]) -> tuple[bool, float]:
         path = np.concatenate(legs)
         margin = float(np.minimum(path - robot.q_min, robot.q_max - path).min())
-        return margin < AMPLE, float(np.max(np.abs(path[0] - q) / robot.v_max))
+        from_here, from_home = (float(np.max(np.abs(path[0] - q) / robot.v_max)) for q in (scene.q, home))
+        return margin < AMPLE, from_here + from_home
 
-    return sorted(toolkit.motion.legs(waypoints, q), key=rank)[:MAX_PATHS]
+    return sorted(toolkit.motion.legs(waypoints, home), key=rank)[:MAX_PATHS]
 
 
 Attempt = Callable[[Any, SceneState], "tuple[Phase, ...] | MotionFailure | Unfit"]

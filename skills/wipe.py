@@ -208,7 +208,7 @@ class Wipe:
             X_WG_end,
             raised(X_WG_end, HEIGHT),
         )
-        for path in paths_through(self._kit, waypoints, scene.q):
+        for path in paths_through(self._kit, waypoints, scene):
             down, near, probe, _, along, up = path
             failure = (
                 motion.line_is_free(pressed, along, touching)
