@@ -35,6 +35,9 @@ OVERTILT = np.radians(10.0)
 OUTWARDS = 0.4
 """Exponent below 1 that draws spots towards the walls of a container, so that room is left for what comes later."""
 
+UPRIGHT = 0.995
+"""Cosine of the angle off level up to which something can be put on top of a body."""
+
 EDGE = 0.002
 """Metres above the lowest corner within which corners belong to the lowest edge."""
 
@@ -80,8 +83,21 @@ def surface_of(place: Region | Table) -> Surface:
     return Surface(place.X_WR * SE3(np.eye(3), centre), (upper[:2] - lower[:2]) / 2, float(upper[2] - lower[2]))
 
 
+def top_of(shape: Shape, X_WO: SE3) -> Surface | None:
+    """The top of a body that lies level, to put something on; None if it lies tilted."""
+    up_O = X_WO.rotation[2]
+    axis = int(np.argmax(np.abs(up_O)))
+    if abs(up_O[axis]) < UPRIGHT:
+        return None
+    R = X_WO.rotation @ _turn_down(-np.sign(up_O[axis]) * np.eye(3)[axis]).T
+    yaw = pin.rpy.rpyToMatrix(0.0, 0.0, float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])))
+    half = np.abs(yaw.T @ X_WO.rotation) @ extents(shape) / 2
+    centre = X_WO.translation + np.array([0.0, 0.0, half_height(shape, X_WO.rotation)])
+    return Surface(SE3(yaw, centre), half[:2], 0.0)
+
+
 def placements(
-    shape: Shape, held: tuple[SE3, SE3], place: Region | Table, rng: np.random.Generator, spots: int = 6
+    shape: Shape, held: tuple[SE3, SE3], surface: Surface, rng: np.random.Generator, spots: int = 6
 ) -> Iterator[Placement]:
     """Placements of an object that is held at X_GO with the hand at X_WG, `held` = (X_WG, X_GO).
 
@@ -92,7 +108,6 @@ def placements(
     pointing straight down; then there is room for it to fall flat. Overlap with other things is
     not looked at here.
     """
-    surface = surface_of(place)
     X_WG, X_GO = held
     R_WO = X_WG.rotation @ X_GO.rotation
     tilts = TILTS[:1] if surface.wall == 0.0 else TILTS

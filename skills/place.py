@@ -1,13 +1,14 @@
 """Place: bring what the hand holds into a container or onto the table, and let go."""
 
 from dataclasses import replace
+from itertools import zip_longest
 
 import numpy as np
 from py_trees.behaviour import Behaviour
 
 from planner.failure import MotionFailure, RefinementFailure
 from planner.grasps import open_width
-from planner.placements import Placement, placements
+from planner.placements import Placement, Surface, placements, surface_of, top_of
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
 from planner.task.facts import place_of
 from planner.task.symbols import GroundAction
@@ -34,6 +35,17 @@ def place_named(scenario: Scenario, name: str) -> Region | Table:
     return scenario.regions[name]
 
 
+def surfaces(scene: SceneState, place: str) -> list[Surface]:
+    """What something can be put on there: a container's floor or the table's top, and what lies level in a container."""
+    where = place_named(scene.scenario, place)
+    found = [surface_of(where)]
+    if isinstance(where, Region):
+        bodies = [scene.scenario.bodies[name] for name in sorted(scene.poses) if place_of(scene, name) == place]
+        tops = [top_of(body.shape, scene.poses[body.name]) for body in bodies]
+        found += [top for top in tops if top is not None]
+    return found
+
+
 class Place:
     """`place(object, place)`: a release pose found by sampling; straight down to it, open, straight back."""
 
@@ -55,7 +67,8 @@ class Place:
 
         shape = scene.scenario.bodies[name].shape
         holding = (self._kit.robot.X_WG(scene.q), scene.held.X_GO)
-        samples = placements(shape, holding, place_named(scene.scenario, goal), rng)
+        ways = [placements(shape, holding, surface, rng) for surface in surfaces(scene, goal)]
+        samples = (sample for turn in zip_longest(*ways) for sample in turn if sample is not None)
         return refine_by_sampling(action, scene, samples, attempt, budget, hints)
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
@@ -81,6 +94,8 @@ class Place:
         name, goal = action.args[:2]
         held = scene.held
         assert held is not None
+        if place_of(replace(scene.moved(name, placement.X_WO_rest), held=None), name) != goal:
+            return Unfit(f"it would not come to lie in {goal}")
         robot, motion = self._kit.robot, self._kit.motion
         touching = pairs(robot.finger_links, name)
         lowering = touching | pairs(name, goal)
