@@ -57,7 +57,8 @@ def open_width(gripper: Gripper, width: float) -> float:
 
 
 def grasps(shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.random.Generator) -> Iterator[Grasp]:
-    """Grasps of a shape that lies at X_WO, best first: from above, near the centre, away from the robot's base (3,).
+    """Grasps of a shape that lies at X_WO, best first: from straight above, near the centre; among
+    those from the side, away from the robot's base (3,).
 
     Ends when all are given. `rng` breaks ties, so that another seed tries another order.
     """
@@ -66,7 +67,8 @@ def grasps(shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.
     outward = (X_WO.translation - base) * np.array([1.0, 1.0, 0.0])
     outward = outward / max(float(np.linalg.norm(outward)), 1e-6)
     offset = np.linalg.norm(np.cross(found.p, found.R[:, :, 2]), axis=1)
-    score = -approach[:, 2] + 0.5 * approach @ outward - 4.0 * offset + JITTER * rng.random(len(offset))
+    level = 1.0 - np.abs(approach[:, 2])
+    score = -approach[:, 2] + 0.5 * level * (approach @ outward) - 4.0 * offset + JITTER * rng.random(len(offset))
     for index in np.argsort(-score, kind="stable"):
         yield Grasp.at(SE3(found.R[index], found.p[index]), float(found.width[index]))
 

@@ -36,7 +36,7 @@ def place_named(scenario: Scenario, name: str) -> Region | Table:
 
 
 def surfaces(scene: SceneState, place: str) -> list[Surface]:
-    """What something can be put on there: a container's floor or the table's top, and what lies level in a container."""
+    """What something can be put on there: a container's floor or the table's top, and what lies level inside."""
     where = place_named(scene.scenario, place)
     found = [surface_of(where)]
     if isinstance(where, Region):
