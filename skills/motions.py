@@ -4,6 +4,8 @@ They set what the controller and the fingers follow, then watch. None of them pl
 `Refine`, which asks for the action's motion in the scene as it is observed now.
 """
 
+from abc import abstractmethod
+
 import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -94,9 +96,9 @@ class PhaseLeaf(Behaviour):
         context.report("phase", action=str(self._run.action), phase=self.name)
         self.begin()
 
+    @abstractmethod
     def begin(self) -> None:
         """Set what is followed from now on."""
-        raise NotImplementedError
 
     def terminate(self, new_status: Status) -> None:
         if new_status == Status.INVALID:

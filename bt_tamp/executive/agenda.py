@@ -6,9 +6,9 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Sequence
 
-from bt_tamp.executive.validity import resume_at, still_good_while
+from bt_tamp.executive.validity import still_good_while
 from planner.refinement import Refinement
-from planner.task.symbols import Fact, GroundAction, TaskPlan
+from planner.task.symbols import Fact, GroundAction, TaskPlan, resume_at
 from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
 from skills.motions import sequence

@@ -9,9 +9,9 @@ from py_trees.common import Status
 
 from bt_tamp.executive.agenda import Agenda
 from bt_tamp.executive.mission import GOAL_TIME, mission
-from bt_tamp.executive.validity import resume_at, still_good_while
+from bt_tamp.executive.validity import still_good_while
 from planner.failure import ExecutionFailure
-from planner.task.symbols import Fact, GroundAction, Step, TaskPlan
+from planner.task.symbols import Fact, GroundAction, Step, TaskPlan, resume_at
 
 TICK = 0.02
 AT = {place: Fact("at", (place,)) for place in ("start", "a", "b", "c")}
