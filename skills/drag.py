@@ -18,7 +18,7 @@ from sim.scene import Held, SceneState, half_height
 from skills.conditions import Achieved
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, Refine, Slide, Touch, sequence
-from skills.skill import Toolkit, Unfit, paths_through, refine_by_sampling
+from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, refine_by_sampling
 from skills.waypoints import raised, shifted
 
 HEIGHT = 0.08
@@ -163,7 +163,7 @@ class Drag:
         self, action: GroundAction, pull: Pull, scene: SceneState, force: float
     ) -> tuple[Phase, ...] | MotionFailure | Unfit:
         name, surface = action.args[:2]
-        robot, motion, contact = self._kit.robot, self._kit.motion, self._kit.contact
+        robot = self._kit.robot
         body, table = scene.scenario.bodies[name], scene.scenario.table
         X_WO = scene.poses[name]
         normal = edge_normal(table, pull.edge)
@@ -178,7 +178,7 @@ class Drag:
         dragging = replace(closed, held=along_with)
         touching = pairs(robot.finger_links, name)
         sliding = touching | pairs(name, surface)
-        failure: MotionFailure | None = None
+        moved = closed.moved(name, shifted(X_WO, X_WG_end.translation - X_WG_press.translation))
         waypoints = (
             raised(X_WG_press, HEIGHT),
             raised(X_WG_press, CLOSE),
@@ -188,29 +188,26 @@ class Drag:
             X_WG_end,
             raised(X_WG_end, HEIGHT),
         )
-        for path in paths_through(self._kit, waypoints, scene):
-            down, near, probe, _, along, up = path
-            moved = closed.moved(name, shifted(X_WO, X_WG_end.translation - X_WG_press.translation))
-            failure = (
-                motion.line_is_free(dragging, along, sliding)
-                or motion.line_is_free(closed, np.vstack([down, near]), touching)
-                or motion.line_is_free(moved, up, touching)
-            )
-            if failure:
-                continue
-            reach = motion.move(closed, [down[0]])
-            if isinstance(reach, MotionFailure):
-                failure = reach
-                continue
-            press = Press(force, np.array(contact.stiffness))
-            still = reach.standstill(scene.q)
-            probing = np.vstack([near, probe[1:]])
+
+        def lines(legs: Legs) -> tuple[Line, ...]:
+            down, near, probe, _, along, up = legs
             return (
-                Phase("close", "open", still, 0.0),
-                Phase("pre-drag", "move", reach, 0.0),
-                Phase("approach", "approach", motion.time_line(down, NEAR_SPEED), 0.0, None, touching),
-                Phase("descend", "touch", motion.time_line(probing, TOUCH_SPEED), 0.0, None, sliding, press),
-                Phase("drag", "slide", motion.time_line(along, SPEED), 0.0, along_with, sliding, press),
-                Phase("retract", "approach", motion.time_line(up, NEAR_SPEED), 0.0, None, sliding),
+                Line(dragging, along, SPEED, sliding),
+                Line(closed, down, NEAR_SPEED, touching),
+                Line(closed, np.vstack([near, probe[1:]]), TOUCH_SPEED, touching, checked=len(near)),
+                Line(moved, up, NEAR_SPEED, touching),
             )
-        return failure or Unfit("the arm can't follow the drag")
+
+        way = find_way(self._kit, waypoints, closed, lines)
+        if not isinstance(way, Way):
+            return way
+        along, down, probe, up = way.lines
+        press = Press(force, np.array(self._kit.contact.stiffness))
+        return (
+            Phase("close", "open", way.reach.standstill(scene.q), 0.0),
+            Phase("pre-drag", "move", way.reach, 0.0),
+            Phase("approach", "approach", down, 0.0, None, touching),
+            Phase("descend", "touch", probe, 0.0, None, sliding, press),
+            Phase("drag", "slide", along, 0.0, along_with, sliding, press),
+            Phase("retract", "approach", up, 0.0, None, sliding),
+        )

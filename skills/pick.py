@@ -17,7 +17,7 @@ from sim.scene import Held, SceneState
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Close, Follow, Refine, guarded, sequence
-from skills.skill import Toolkit, Unfit, paths_through, refine_by_sampling
+from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, hand_would_hit, refine_by_sampling
 from skills.waypoints import back_off, raised
 from skills.weigh import Weigh
 
@@ -103,38 +103,33 @@ class Pick:
         self, action: GroundAction, grasp: Grasp, scene: SceneState
     ) -> tuple[Phase, ...] | MotionFailure | Unfit:
         name, place = action.args[:2]
-        robot, motion = self._kit.robot, self._kit.motion
+        robot = self._kit.robot
         opening = open_width(robot.gripper, grasp.width)
         ready = replace(scene, opening=opening)
         X_WG = scene.poses[name] * grasp.X_OG
         touching = pairs(robot.finger_links, name)
-        hits = motion.hand_hits(ready, X_WG, touching)
-        if hits:
-            movable = hits & frozenset(scene.poses)
-            return Unfit("the hand would hit " + ", ".join(sorted(hits)), movable if movable == hits else frozenset())
+        unfit = hand_would_hit(self._kit, ready, X_WG, touching)
+        if unfit:
+            return unfit
 
         grasped = replace(scene, opening=grasp.width, held=Held(name, grasp.X_OG.inverse()))
         resting = touching | pairs(name, place)
-        failure: MotionFailure | None = None
-        for path in paths_through(self._kit, (back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT)), scene):
-            into, out = path
-            failure = motion.line_is_free(ready, into, touching) or motion.line_is_free(grasped, out, resting)
-            if failure:
-                continue
-            reach = motion.move(ready, [into[0]])
-            if isinstance(reach, MotionFailure):
-                failure = reach
-                continue
-            approach = motion.time_line(into, NEAR_SPEED)
-            lift = motion.time_line(out, NEAR_SPEED)
-            still = approach.standstill(approach.end)
-            return (
-                Phase("pre-grasp", "move", reach, opening),
-                Phase("approach", "approach", approach, opening, allowed=touching),
-                Phase("close", "close", still, opening, allowed=resting, grip=grip_force(scene.scenario.bodies[name])),
-                Phase("lift", "approach", lift, grasp.width, grasped.held, resting),
-            )
-        return failure or Unfit("the arm can't reach the grasp")
+
+        def lines(legs: Legs) -> tuple[Line, ...]:
+            into, out = legs
+            return Line(ready, into, NEAR_SPEED, touching), Line(grasped, out, NEAR_SPEED, resting)
+
+        way = find_way(self._kit, (back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT)), ready, lines)
+        if not isinstance(way, Way):
+            return way
+        approach, lift = way.lines
+        still = approach.standstill(approach.end)
+        return (
+            Phase("pre-grasp", "move", way.reach, opening),
+            Phase("approach", "approach", approach, opening, allowed=touching),
+            Phase("close", "close", still, opening, allowed=resting, grip=grip_force(scene.scenario.bodies[name])),
+            Phase("lift", "approach", lift, grasp.width, grasped.held, resting),
+        )
 
 
 def grip_force(body: Body) -> float:

@@ -18,7 +18,7 @@ from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, Refine, guarded, sequence
-from skills.skill import Toolkit, Unfit, paths_through, refine_by_sampling
+from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, hand_would_hit, refine_by_sampling
 from skills.waypoints import back_off, raised
 
 STANDOFF = 0.12
@@ -96,35 +96,30 @@ class Place:
         assert held is not None
         if place_of(replace(scene.moved(name, placement.X_WO_rest), held=None), name) != goal:
             return Unfit(f"it would not come to lie in {goal}")
-        robot, motion = self._kit.robot, self._kit.motion
+        robot = self._kit.robot
         touching = pairs(robot.finger_links, name)
         lowering = touching | pairs(name, goal)
         X_WG = placement.X_WO * held.X_GO.inverse()
-        hits = motion.hand_hits(scene, X_WG, touching)
-        if hits:
-            movable = hits & frozenset(scene.poses)
-            return Unfit("the hand would hit " + ", ".join(sorted(hits)), movable if movable == hits else frozenset())
+        unfit = hand_would_hit(self._kit, scene, X_WG, touching)
+        if unfit:
+            return unfit
 
         opening = open_width(robot.gripper, scene.opening)
         released = replace(scene.moved(name, placement.X_WO), held=None, opening=opening)
         leaving = lowering | pairs(robot.hand_links, name)
-        failure: MotionFailure | None = None
-        for path in paths_through(self._kit, (raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT)), scene):
-            into, out = path
-            failure = motion.line_is_free(scene, into, lowering) or motion.line_is_free(released, out, leaving)
-            if failure:
-                continue
-            reach = motion.move(scene, [into[0]], touching)
-            if isinstance(reach, MotionFailure):
-                failure = reach
-                continue
-            descend = motion.time_line(into, NEAR_SPEED)
-            retreat = motion.time_line(out, NEAR_SPEED)
-            still = descend.standstill(descend.end)
-            return (
-                Phase("pre-place", "move", carried(robot, reach, held), scene.opening, held, touching),
-                Phase("descend", "approach", descend, scene.opening, held, lowering),
-                Phase("open", "open", still, opening, None, leaving),
-                Phase("retreat", "approach", retreat, opening, None, leaving),
-            )
-        return failure or Unfit("the arm can't reach the release pose")
+
+        def lines(legs: Legs) -> tuple[Line, ...]:
+            into, out = legs
+            return Line(scene, into, NEAR_SPEED, lowering), Line(released, out, NEAR_SPEED, leaving)
+
+        way = find_way(self._kit, (raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT)), scene, lines, touching)
+        if not isinstance(way, Way):
+            return way
+        descend, retreat = way.lines
+        still = descend.standstill(descend.end)
+        return (
+            Phase("pre-place", "move", carried(robot, way.reach, held), scene.opening, held, touching),
+            Phase("descend", "approach", descend, scene.opening, held, lowering),
+            Phase("open", "open", still, opening, None, leaving),
+            Phase("retreat", "approach", retreat, opening, None, leaving),
+        )

@@ -14,7 +14,8 @@ from py_trees.behaviour import Behaviour
 
 from planner.failure import Blocked, MotionFailure, RefinementFailure
 from planner.motion.motion_planner import MotionPlanner
-from planner.refinement import Budget, Hints, Phase, Refinement, Refiner
+from planner.motion.trajectory import Trajectory
+from planner.refinement import Budget, Hints, Pair, Phase, Refinement, Refiner
 from planner.task.symbols import GroundAction
 from sim.robot import RobotModel
 from sim.scene import SceneState
@@ -90,6 +91,72 @@ def paths_through(toolkit: Toolkit, waypoints: Sequence[SE3], scene: SceneState)
         return margin < AMPLE, from_here + from_home
 
     return sorted(toolkit.motion.legs(waypoints, home), key=rank)[:MAX_PATHS]
+
+
+Legs = Sequence[np.ndarray]
+"""A joint path cut into legs (n,7) at the hand's waypoints."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight stretch of the hand near contact: joint path (n,7) in `scene` at `speed` (m/s), and what may touch.
+
+    What lies beyond the first `checked` configurations is sought, not meant to be reached (the way
+    down to a surface goes on below it), so it is not checked.
+    """
+
+    scene: SceneState
+    path: np.ndarray
+    speed: float
+    allowed: frozenset[Pair]
+    checked: int | None = None
+
+
+@dataclass(frozen=True)
+class Way:
+    """A free motion to where the first line begins, and the lines as timed."""
+
+    reach: Trajectory
+    lines: tuple[Trajectory, ...]
+
+
+def find_way(
+    toolkit: Toolkit,
+    waypoints: Sequence[SE3],
+    scene: SceneState,
+    lines_of: Callable[[Legs], Sequence[Line]],
+    allowed: frozenset[Pair] = frozenset(),
+) -> "Way | MotionFailure | Unfit":
+    """The first joint path through poses X_WG all of whose lines, and the free motion from scene.q, are free.
+
+    `allowed` pairs may touch during the free motion. Every line is confirmed by the exact model as timed.
+    """
+    motion = toolkit.motion
+    failure: MotionFailure | None = None
+    for legs in paths_through(toolkit, waypoints, scene):
+        lines = lines_of(legs)
+        checks = (motion.line_is_free(line.scene, line.path[: line.checked], line.allowed) for line in lines)
+        failure = next((check for check in checks if check is not None), None)
+        if failure:
+            continue
+        reach = motion.move(scene, [legs[0][0]], allowed)
+        if isinstance(reach, MotionFailure):
+            failure = reach
+            continue
+        timed = [motion.timed_line(line.scene, line.path, line.speed, line.allowed, line.checked) for line in lines]
+        failure = next((line for line in timed if isinstance(line, MotionFailure)), None)
+        if failure is None:
+            return Way(reach, tuple(line for line in timed if isinstance(line, Trajectory)))
+    return failure or Unfit("the arm can't follow the hand's path")
+
+
+def hand_would_hit(toolkit: Toolkit, scene: SceneState, X_WG: SE3, allowed: frozenset[Pair]) -> Unfit | None:
+    """What the hand at X_WG would hit, whatever the arm does; movable bodies are culprits if nothing else is hit."""
+    hits = toolkit.motion.hand_hits(scene, X_WG, allowed)
+    if not hits:
+        return None
+    movable = hits & frozenset(scene.poses)
+    return Unfit("the hand would hit " + ", ".join(sorted(hits)), movable if movable == hits else frozenset())
 
 
 Attempt = Callable[[Any, SceneState], "tuple[Phase, ...] | MotionFailure | Unfit"]

@@ -23,7 +23,7 @@ from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Refine, Slide, Touch, guarded, sequence
-from skills.skill import Toolkit, Unfit, paths_through, refine_by_sampling
+from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, refine_by_sampling
 from skills.waypoints import raised, shifted
 
 HEIGHT = 0.08
@@ -187,7 +187,7 @@ class Wipe:
         crumb, surface, pan = action.args[:3]
         held = scene.held
         assert held is not None
-        robot, motion, contact = self._kit.robot, self._kit.motion, self._kit.contact
+        robot, contact = self._kit.robot, self._kit.contact
         crumbs = _crumbs(scene, robot.gripper.min_grasp_extent)
         X_WG_start, X_WG_end = stroke_ends(scene, held, crumb, stroke, scene.scenario.regions[pan])
         back, height = contact.pre_wipe or (0.0, HEIGHT)
@@ -198,7 +198,6 @@ class Wipe:
         gripping = pairs(robot.finger_links, held.name)
         touching = gripping | pairs(held.name, surface)
         sweeping = touching | pairs(robot.finger_links | {held.name}, crumbs) if crumbs else touching
-        failure: MotionFailure | None = None
         waypoints = (
             X_WG_pre,
             raised(X_WG_start, CLOSE),
@@ -208,36 +207,28 @@ class Wipe:
             X_WG_end,
             raised(X_WG_end, HEIGHT),
         )
-        for path in paths_through(self._kit, waypoints, scene):
-            down, near, probe, _, along, up = path
-            failure = (
-                motion.line_is_free(pressed, along, touching)
-                or motion.line_is_free(pressed, np.vstack([down, near]), touching)
-                or motion.line_is_free(pressed, up, touching)
-            )
-            if failure:
-                continue
-            reach = motion.move(scene, [down[0]], gripping)
-            if isinstance(reach, MotionFailure):
-                failure = reach
-                continue
-            press = Press(contact.force, np.array(contact.stiffness))
+
+        def lines(legs: Legs) -> tuple[Line, ...]:
+            down, near, probe, _, along, up = legs
             return (
-                Phase("pre-wipe", "move", carried(robot, reach, held), scene.opening, held, gripping),
-                Phase("approach", "approach", motion.time_line(down, NEAR_SPEED), scene.opening, held, sweeping),
-                Phase(
-                    "descend",
-                    "touch",
-                    motion.time_line(np.vstack([near, probe[1:]]), TOUCH_SPEED),
-                    scene.opening,
-                    held,
-                    sweeping,
-                    press,
-                ),
-                Phase("stroke", "slide", motion.time_line(along, contact.speed), scene.opening, held, sweeping, press),
-                Phase("retract", "approach", motion.time_line(up, NEAR_SPEED), scene.opening, held, sweeping),
+                Line(pressed, along, contact.speed, touching),
+                Line(pressed, down, NEAR_SPEED, touching),
+                Line(pressed, np.vstack([near, probe[1:]]), TOUCH_SPEED, touching, checked=len(near)),
+                Line(pressed, up, NEAR_SPEED, touching),
             )
-        return failure or Unfit("the arm can't follow the stroke")
+
+        way = find_way(self._kit, waypoints, scene, lines, gripping)
+        if not isinstance(way, Way):
+            return way
+        along, down, probe, up = way.lines
+        press = Press(contact.force, np.array(contact.stiffness))
+        return (
+            Phase("pre-wipe", "move", carried(robot, way.reach, held), scene.opening, held, gripping),
+            Phase("approach", "approach", down, scene.opening, held, sweeping),
+            Phase("descend", "touch", probe, scene.opening, held, sweeping, press),
+            Phase("stroke", "slide", along, scene.opening, held, sweeping, press),
+            Phase("retract", "approach", up, scene.opening, held, sweeping),
+        )
 
 
 def _either_way_round(stroke: Stroke, scenario: Scenario, held: Held, R_WO: np.ndarray) -> list[Stroke]:

@@ -16,7 +16,7 @@ from planner.motion.ik_numeric import track_numerically
 from planner.motion.lines import CartesianPath, interpolate, track
 from planner.motion.ompl_ import PathSettings, Query, plan_path
 from planner.motion.shortcut import shortened
-from planner.motion.timing import TCP_ACCELERATION, time_line, time_path, time_path_with_stops
+from planner.motion.timing import time_line, time_path, time_path_with_stops
 from planner.motion.trajectory import Trajectory
 from planner.motion.world import FREE_MARGIN, Margins, movables
 from planner.refinement import Pair, Work
@@ -126,9 +126,23 @@ class MotionPlanner:
         contacts = self._contacts(scene, path, margins)
         return blame("the line comes too near:", contacts, movables(scene)) if contacts else None
 
-    def time_line(self, path: np.ndarray, tcp_speed: float, tcp_acceleration: float = TCP_ACCELERATION) -> Trajectory:
-        """Follow the joint path (n,7) of a line with the hand at tcp_speed (m/s), see `timing.time_line`."""
-        return time_line(self.robot, path, tcp_speed, tcp_acceleration)
+    def timed_line(
+        self,
+        scene: SceneState,
+        path: np.ndarray,
+        tcp_speed: float,
+        allowed: frozenset[Pair] = NOTHING,
+        checked: int | None = None,
+    ) -> Trajectory | MotionFailure:
+        """Follow the joint path (n,7) of a line with the hand at tcp_speed (m/s), see `timing.time_line`.
+
+        The motion as timed is confirmed by the exact model, up to the path's first `checked` configurations.
+        """
+        trajectory = time_line(self.robot, path, tcp_speed)
+        q = trajectory.q
+        if checked is not None and checked < len(path):
+            q = q[: int(np.argmin(np.abs(q - path[checked - 1]).max(axis=1))) + 1]
+        return self._audit(scene, q, Margins(self.settings.audit_margin, allowed)) or trajectory
 
     def audit(
         self,
