@@ -155,12 +155,43 @@ class BulletPlant:
             found.append(Contact(first, second, np.array(point[6]), normal * normal_force + friction, normal_force))
         return found
 
-    def push(self, force: np.ndarray) -> None:
-        """Apply a force (3,) in N, in W, at the tool centre during the next step."""
-        tcp = p.getLinkState(self._robot, self._tcp_link, computeForwardKinematics=True, physicsClientId=self._client)
-        p.applyExternalForce(
-            self._robot, self._tcp_link, list(force), tcp[0], p.WORLD_FRAME, physicsClientId=self._client
+    def push(self, force: np.ndarray, link: str | None = None) -> None:
+        """Apply a force (3,) in N, in W, during the next step: at the tool centre, or at the centre of mass of
+        one of the robot's links. Raises ValueError for a link that the robot doesn't have."""
+        index = self._tcp_link if link is None else self._link_index(link)
+        state = p.getLinkState(self._robot, index, computeForwardKinematics=True, physicsClientId=self._client)
+        p.applyExternalForce(self._robot, index, list(force), state[0], p.WORLD_FRAME, physicsClientId=self._client)
+
+    def set_joint_friction(self, torque: np.ndarray) -> None:
+        """From now on the arm's joints rub with Coulomb friction of `torque` (7,) Nm: the engine's own joint motors
+        hold the joints still with at most as much, so a joint sticks as well as slides."""
+        p.setJointMotorControlArray(
+            self._robot,
+            self._arm_joints,
+            p.VELOCITY_CONTROL,
+            targetVelocities=[0.0] * 7,
+            forces=[float(t) for t in torque],
+            physicsClientId=self._client,
         )
+
+    def scale_masses(self, factor: float) -> None:
+        """Make every moving link of the robot `factor` times as heavy as its model says, inertia included."""
+        for link in range(p.getNumJoints(self._robot, physicsClientId=self._client)):
+            info = p.getDynamicsInfo(self._robot, link, physicsClientId=self._client)
+            p.changeDynamics(
+                self._robot,
+                link,
+                mass=factor * info[0],
+                localInertiaDiagonal=[factor * i for i in info[2]],
+                physicsClientId=self._client,
+            )
+
+    def _link_index(self, name: str) -> int:
+        for index, known in self._link_names.items():
+            if known == name and index >= 0:
+                return index
+        known = ", ".join(n for i, n in sorted(self._link_names.items()) if i >= 0)
+        raise ValueError(f"no moving link {name!r}, known: {known}")
 
     def _name(self, body: int, link: int) -> str:
         if body == self._robot:
