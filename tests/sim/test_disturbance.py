@@ -133,7 +133,7 @@ def test_late_joints_are_where_they_were(make):
     # Only the reflex that holds the weight sees other angles, by microradians.
     for now, then in zip(late[4:], true, strict=False):
         np.testing.assert_allclose(now.q, then.q, atol=1e-5)
-        np.testing.assert_allclose(now.v, then.v, atol=1e-3)
+        np.testing.assert_allclose(now.v, then.v, atol=5e-3)
 
 
 def test_poses_may_be_noisy_late_or_missing_each_for_some_bodies_only(make):
