@@ -84,6 +84,10 @@ class PathBlocked(ExecutionFailure):
     """Something stands in the remaining path."""
 
 
+class SceneChanged(ExecutionFailure):
+    """Something moved that the motion relied on. Nothing is learned from it: what it means is seen."""
+
+
 class EffectMissing(ExecutionFailure):
     """The motion ended, but what it was for isn't true."""
 

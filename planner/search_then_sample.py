@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from planner.action_refinement import ActionRefiner
-from planner.failure import ExecutionFailure, RefinementFailure
+from planner.failure import ExecutionFailure, RefinementFailure, SceneChanged
 from planner.plan_refinement import PlanRefiner, RefinedPlan, Report, Stuck
 from planner.refinement import Budget, Refinement, Refiners, Work
 from planner.task.compilation import with_constraints
@@ -138,6 +138,8 @@ class SearchThenSample:
         """Take in a failure met while acting; `scene` is as observed."""
         self.learned.observe(scene)
         situation = Situation.now(scene)
+        if isinstance(failure, SceneChanged):
+            return
         if isinstance(failure, ExecutionFailure):
             if self.learned.learn_execution(failure, scene):
                 self._report_learned(failure.action, situation)

@@ -155,12 +155,31 @@ class BulletPlant:
             found.append(Contact(first, second, np.array(point[6]), normal * normal_force + friction, normal_force))
         return found
 
+    def pressed(self, first: str, second: str) -> float:
+        """True normal force in N between two things, for reports and benchmarks. Raises ValueError for a name that
+        stands for no single body."""
+        bodies = []
+        for name in (first, second):
+            found = [body for body, known in self._names.items() if known == name]
+            if len(found) != 1:
+                raise ValueError(f"{len(found)} bodies are called {name!r}, expected one")
+            bodies += found
+        return sum(point[9] for point in p.getContactPoints(*bodies, physicsClientId=self._client))
+
     def push(self, force: np.ndarray, link: str | None = None) -> None:
         """Apply a force (3,) in N, in W, during the next step: at the tool centre, or at the centre of mass of
         one of the robot's links. Raises ValueError for a link that the robot doesn't have."""
         index = self._tcp_link if link is None else self._link_index(link)
         state = p.getLinkState(self._robot, index, computeForwardKinematics=True, physicsClientId=self._client)
         p.applyExternalForce(self._robot, index, list(force), state[0], p.WORLD_FRAME, physicsClientId=self._client)
+
+    def put(self, name: str, X_WO: SE3) -> None:
+        """Put a body elsewhere, at rest: what a person's hand does, for disturbances. The executive never calls it."""
+        pose = pin.SE3ToXYZQUAT(X_WO)
+        p.resetBasePositionAndOrientation(
+            self._bodies[name], list(pose[:3]), list(pose[3:]), physicsClientId=self._client
+        )
+        p.resetBaseVelocity(self._bodies[name], [0.0] * 3, [0.0] * 3, physicsClientId=self._client)
 
     def set_joint_friction(self, torque: np.ndarray) -> None:
         """From now on the arm's joints rub with Coulomb friction of `torque` (7,) Nm: the engine's own joint motors

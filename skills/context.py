@@ -64,6 +64,11 @@ class ActionRun:
                 return phase
         raise LookupError(f"{self.action} has no phase {name!r}, known: {[phase.name for phase in phases]}")
 
+    def running(self, phase: Phase | None) -> Phase | None:
+        """`phase` if it is one of this action's as refined last, else None."""
+        phases = self.refinement.phases if self.refinement else ()
+        return phase if any(phase is one for one in phases) else None
+
 
 def _ignore(kind: str, **data: Any) -> None:
     """Drop an event."""

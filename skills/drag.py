@@ -17,7 +17,8 @@ from sim.robot import GRAVITY
 from sim.scene import Held, SceneState, half_height
 from skills.conditions import Achieved
 from skills.context import ActionRun, SkillContext
-from skills.motions import Follow, Open, Refine, Slide, Touch, sequence
+from skills.motions import Follow, Open, Slide, Touch, guarded, sequence
+from skills.refine import PathFree, Refine
 from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, refine_by_sampling
 from skills.waypoints import raised, shifted
 
@@ -147,14 +148,18 @@ class Drag:
             body, table = scene.scenario.bodies[name], scene.scenario.table
             return pull is not None and travel(body, scene.poses[name], table, pull) < LEFT_OVER * pull.overhang
 
-        return sequence(
-            str(run.action),
-            Refine(run, context),
+        motion = self._kit.motion
+        reach = sequence(
+            "to the object",
             Open("close", run, context),
             Follow("pre-drag", run, context),
             Follow("approach", run, context),
-            Touch("descend", run, context),
-            Slide("drag", run, context),
+        )
+        contact = sequence("in contact", Touch("descend", run, context), Slide("drag", run, context))
+        return sequence(
+            str(run.action),
+            guarded("reach", Refine(run, context, motion), reach),
+            guarded("watched", PathFree(run, context, motion), contact),
             Follow("retract", run, context),
             Achieved(stands_out, run, context),
         )

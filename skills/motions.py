@@ -1,7 +1,6 @@
 """Leaves that move: each follows one phase of the refined action and says how it went.
 
-They set what the controller and the fingers follow, then watch. None of them plans, except
-`Refine`, which asks for the action's motion in the scene as it is observed now.
+They set what the controller and the fingers follow, then watch. None of them plans.
 """
 
 from abc import abstractmethod
@@ -11,8 +10,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Sequence
 
-from planner.failure import ContactLost, ExecutionFailure, ForceExceeded, GraspMissed, PathBlocked, RefinementFailure
-from planner.refinement import Phase, Refinement
+from planner.failure import ContactLost, ExecutionFailure, ForceExceeded, GraspMissed, PathBlocked
+from planner.refinement import Phase
 from skills.context import ActionRun, SkillContext
 from skills.control.reference import Reference
 from skills.payload import load_of
@@ -39,40 +38,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def guarded(name: str, condition: Behaviour, body: Behaviour) -> Behaviour:
     """`body`, as long as `condition` holds: it is looked at again at every tick."""
     return Sequence(name, memory=False, children=[condition, body])
-
-
-class Refine(Behaviour):
-    """Refines the action against the scene as observed, the samples known to work first.
-
-    Thinking takes simulated time; meanwhile the arm holds.
-    """
-
-    def __init__(self, run: ActionRun, context: SkillContext) -> None:
-        super().__init__("refine")
-        self._run, self._context = run, context
-        self._outcome: Refinement | RefinementFailure | None = None
-        self._ready_at = 0.0
-
-    def initialise(self) -> None:
-        self._outcome = None
-        self._context.controller.hold()
-
-    def update(self) -> Status:
-        now = self._context.observation.t
-        if self._outcome is None:
-            self._outcome, cost = self._context.refine(self._run.action)
-            self._ready_at = now + cost
-        if now < self._ready_at:
-            return Status.RUNNING
-        if isinstance(self._outcome, RefinementFailure):
-            self._context.fail(self._outcome)
-            self.feedback_message = self._outcome.reason
-            return Status.FAILURE
-        self._run.refinement = self._outcome
-        held = self._context.scene.held
-        if held is not None:
-            self._context.controller.set_payload(*load_of(self._context.scene, held.name))
-        return Status.SUCCESS
 
 
 class PhaseLeaf(Behaviour):

@@ -16,7 +16,8 @@ from sim.robot import GRAVITY
 from sim.scene import Held, SceneState
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
-from skills.motions import Close, Follow, Refine, guarded, sequence
+from skills.motions import Close, Follow, guarded, sequence
+from skills.refine import Refine
 from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, hand_would_hit, refine_by_sampling
 from skills.waypoints import back_off, raised
 from skills.weigh import Weigh
@@ -67,11 +68,10 @@ class Pick:
 
     def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:
         name = run.action.args[0]
+        reach = sequence("to the grasp", Follow("pre-grasp", run, context), Follow("approach", run, context))
         return sequence(
             str(run.action),
-            Refine(run, context),
-            Follow("pre-grasp", run, context),
-            Follow("approach", run, context),
+            guarded("reach", Refine(run, context, self._kit.motion), reach),
             Close("close", run, context),
             guarded("hold", HandHolds(name, run, context), Follow("lift", run, context)),
             Weigh(run, context),

@@ -17,7 +17,8 @@ from sim.scene import SceneState
 from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
-from skills.motions import Follow, Open, Refine, guarded, sequence
+from skills.motions import Follow, Open, guarded, sequence
+from skills.refine import Refine
 from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, hand_would_hit, refine_by_sampling
 from skills.waypoints import back_off, raised
 
@@ -78,10 +79,10 @@ class Place:
 
     def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:
         name, goal = run.action.args[:2]
-        carry = sequence("carry", Follow("pre-place", run, context), Follow("descend", run, context))
+        lower = sequence("to the place", Follow("pre-place", run, context), Follow("descend", run, context))
+        carry = guarded("carry", Refine(run, context, self._kit.motion), lower)
         return sequence(
             str(run.action),
-            Refine(run, context),
             guarded("hold", HandHolds(name, run, context), carry),
             Open("open", run, context),
             Follow("retreat", run, context),

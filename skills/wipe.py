@@ -22,7 +22,8 @@ from sim.scene import Held, SceneState
 from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
-from skills.motions import Follow, Refine, Slide, Touch, guarded, sequence
+from skills.motions import Follow, Slide, Touch, guarded, sequence
+from skills.refine import PathFree, Refine
 from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, refine_by_sampling
 from skills.waypoints import raised, shifted
 
@@ -165,19 +166,19 @@ class Wipe:
         return after
 
     def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:
-        contact = sequence(
+        motion = self._kit.motion
+        reach = sequence("to the table", Follow("pre-wipe", run, context), Follow("approach", run, context))
+        contact = sequence("in contact", Touch("descend", run, context), Slide("stroke", run, context))
+        wiping = sequence(
             "stroke with the sponge",
-            Follow("pre-wipe", run, context),
-            Follow("approach", run, context),
-            Touch("descend", run, context),
-            Slide("stroke", run, context),
+            guarded("reach", Refine(run, context, motion), reach),
+            guarded("watched", PathFree(run, context, motion), contact),
             Follow("retract", run, context),
         )
         crumb, _, pan = run.action.args[:3]
         return sequence(
             str(run.action),
-            Refine(run, context),
-            guarded("hold", HandHolds(None, run, context), contact),
+            guarded("hold", HandHolds(None, run, context), wiping),
             Achieved(lambda scene: place_of(scene, crumb) == pan, run, context),
         )
 

@@ -130,6 +130,7 @@ _STYLES = {
     "learned": "magenta",
     "plan_installed": "cyan",
     "action_failed": "red",
+    "refined_again": "yellow",
     "replan": "bold yellow",
     "goal_reached": "bold green",
     "run_ended": "bold red",

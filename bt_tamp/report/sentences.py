@@ -25,6 +25,8 @@ def sentence(event: Event) -> str | None:
             return f"plan: {' → '.join(data['actions']) or 'nothing to do'}"
         case "action_failed":
             return f"{data['action']} failed: {data['reason']}"
+        case "refined_again":
+            return f"{data['action']} is worked out anew: {data['reason']}"
         case "replan":
             return f"planning again: {data['reason']}"
         case "goal_reached":

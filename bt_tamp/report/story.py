@@ -101,6 +101,9 @@ class _Teller:
         self._running, self._last_failure = None, data["reason"]
         self._say(f"{data['action']} failed{where}: {data['reason']}.", f"{event.t:7.1f} s          ")
 
+    def _refined_again(self, event: Event, data: Any) -> None:
+        self._say(f"{data['action']} was worked out anew: {data['reason']}.", f"{event.t:7.1f} s          ")
+
     def _replan(self, event: Event, data: Any) -> None:
         reason = "" if data["reason"] == self._last_failure else f", because {data['reason']}"
         self._say(f"The plan was dropped{reason}, and a new one sought from what was observed then.")

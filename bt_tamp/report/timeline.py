@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from bt_tamp.report.events import Event
 from bt_tamp.report.sentences import sentence
 
-TOLD = frozenset({"refinement_failed", "learned", "action_failed", "replan", "goal_reached", "run_ended"})
+TOLD = frozenset(
+    {"refinement_failed", "learned", "action_failed", "refined_again", "replan", "goal_reached", "run_ended"}
+)
 """Events at which the film stands still so that their sentences can be read."""
 
 MOST_TOLD = 4

@@ -56,7 +56,8 @@ class Bench:
         self.plant = BulletPlant(scenario, self.robot)
         self._belief = Belief(scenario, self.robot)
         settings = ContactSettings(mode=contact)
-        self.skills = skills(Toolkit(self.robot, MotionPlanner(self.robot, seed), settings))
+        self.motion = MotionPlanner(self.robot, seed)
+        self.skills = skills(Toolkit(self.robot, self.motion, settings))
         self._rng = np.random.default_rng(seed)
         observation = self.plant.observe()
         self.context = SkillContext(

@@ -1,0 +1,83 @@
+"""Does what an action was refined for still hold? Its objects lie where they lay, and the rest of its path is free."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from pinocchio import SE3
+
+from planner.failure import MotionFailure
+from planner.motion.motion_planner import MotionPlanner
+from planner.refinement import Phase, Refinement
+from sim.scene import SceneState, pose_distance
+
+SHIFT = 0.008
+TURN = np.radians(6.0)
+"""How far an object may move before what was refined for it no longer fits."""
+
+STIR = 0.002
+STIR_TURN = np.radians(2.0)
+"""How far a body may move before the path is looked at again."""
+
+
+class Watch:
+    """Compares the scene with the one in which an action was refined. Cheap as long as nothing has moved."""
+
+    def __init__(self, motion: MotionPlanner, refinement: Refinement, scene: SceneState) -> None:
+        self._motion = motion
+        self._phases = refinement.phases
+        self._refined = scene
+        self._looked_at = scene.poses
+        self._objects = [name for name in refinement.action.args if name in scene.poses and not _holds(scene, name)]
+
+    def object_shifted(self, scene: SceneState) -> str | None:
+        """Which of the action's objects no longer lies where it was refined for, in a sentence."""
+        for name in self._objects:
+            if name not in scene.poses:
+                return f"{name} is gone"
+            if _has_moved(self._refined.poses[name], scene.poses[name], SHIFT, TURN):
+                return f"{name} was moved"
+        return None
+
+    def path_blocked(self, scene: SceneState, phase: Phase, since: float) -> MotionFailure | None:
+        """What is in the way of the rest of a phase, `since` seconds after its start, and of the moves after it.
+
+        Looked for only when a body that the phase may not touch has moved.
+        """
+        may_touch = frozenset[str]().union(*phase.allowed)
+        stirred = [
+            name
+            for name, X_WO in scene.poses.items()
+            if name not in may_touch
+            and not _holds(scene, name)
+            and (name not in self._looked_at or _has_moved(self._looked_at[name], X_WO, STIR, STIR_TURN))
+        ]
+        if not stirred:
+            return None
+        for ahead, start in self._ahead(phase, since):
+            seen = replace(scene, opening=ahead.opening, held=ahead.held)
+            failure = self._motion.audit(seen, ahead.trajectory, ahead.allowed, since=start)
+            if failure is not None:
+                return failure
+        self._looked_at = scene.poses
+        return None
+
+    def _ahead(self, phase: Phase, since: float) -> Sequence[tuple[Phase, float]]:
+        """The phase from `since` on, and the free motions that follow it."""
+        names = [one.name for one in self._phases]
+        rest = self._phases[names.index(phase.name) + 1 :] if phase.name in names else ()
+        found = [(phase, since)]
+        for one in rest:
+            if one.kind not in ("move", "approach"):
+                break
+            found.append((one, 0.0))
+        return found
+
+
+def _holds(scene: SceneState, name: str) -> bool:
+    return scene.held is not None and scene.held.name == name
+
+
+def _has_moved(X_before: SE3, X_now: SE3, shift: float, turn: float) -> bool:
+    distance, angle = pose_distance(X_before, X_now)
+    return distance > shift or angle > turn

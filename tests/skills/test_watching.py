@@ -1,0 +1,101 @@
+"""Things that move while an action is under way."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from bench import Bench, action, scene_with, with_pose
+from pinocchio import SE3
+from py_trees.common import Status
+from py_trees.trees import BehaviourTree
+
+from planner.failure import SceneChanged
+from planner.refinement import Budget, Hints, Refinement
+from planner.task.facts import place_of
+from scenarios.scenario import Scenario
+from scenarios.shapes import Box
+from skills.context import ActionRun
+
+
+def carried_out(bench: Bench, text: str, phase: str, share: float, disturb: Callable[[], None]) -> Status:
+    """Carry out an action, and disturb once, as soon as `share` of the named phase's time has passed."""
+    what = action(text)
+    run = ActionRun(what)
+    tree = BehaviourTree(bench.skills[what.name].subtree(run, bench.context))
+    disturbed = False
+    for _ in range(2000):
+        tree.tick()
+        if tree.root.status is not Status.RUNNING:
+            assert disturbed, f"{text} never came to {phase}"
+            return tree.root.status
+        now = bench.context.phase
+        is_due = now is not None and now.name == phase and run.running(now) is not None
+        if is_due and not disturbed and bench.context.controller.time_in_reference >= share * now.trajectory.duration:
+            disturb()
+            disturbed = True
+        bench.run(10)
+    raise AssertionError(f"{text} did not end")
+
+
+def shifted(bench: Bench, name: str, x: float, y: float) -> Callable[[], None]:
+    X_WO = bench.scene.poses[name]
+    return lambda: bench.plant.put(name, SE3(X_WO.rotation, X_WO.translation + np.array([x, y, 0.0])))
+
+
+def with_post(scenario: Scenario, height: float) -> Scenario:
+    """The scenario with its box as a slim post, out of the way."""
+    body = scenario.bodies["box"]
+    top = float(scenario.table.X_WT.translation[2]) + scenario.table.size[2] / 2
+    X_WO = SE3(np.eye(3), np.array([0.7, 0.35, top + height / 2]))
+    post = replace(body, shape=Box((0.06, 0.06, height)), X_WO=X_WO)
+    return replace(scenario, bodies={**scenario.bodies, "box": post})
+
+
+def events_of(bench: Bench) -> list[tuple[str, str]]:
+    found: list[tuple[str, str]] = []
+    bench.context.report = lambda kind, **data: found.append((kind, str(data.get("reason", ""))))
+    return found
+
+
+def test_an_object_moved_while_the_hand_comes_for_it_is_picked_where_it_is_now():
+    bench = Bench(scene_with("box"))
+    told = events_of(bench)
+    assert (
+        carried_out(bench, "pick(box, table)", "pre-grasp", 0.5, shifted(bench, "box", -0.08, 0.10)) is Status.SUCCESS
+    )
+    assert bench.scene.held is not None
+    assert bench.scene.held.name == "box"
+    assert [reason for kind, reason in told if kind == "refined_again"] == ["box was moved"]
+
+
+def test_what_is_put_in_the_way_of_the_hand_is_gone_around_without_touching_it():
+    bench = Bench(with_post(scene_with("box", "sponge"), height=0.6))
+    told = events_of(bench)
+    assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
+    lift = bench.skills["place"].refine(
+        action("place(sponge, left_bin)"), bench.scene, np.random.default_rng(0), Budget(), Hints()
+    )
+    assert isinstance(lift, Refinement)
+    carry = lift.phases[0].trajectory
+    p_WG = [bench.robot.X_WG(carry.at(share * carry.duration)[0]).translation for share in np.linspace(0.3, 0.9, 13)]
+    height = bench.scene.poses["box"].translation[2]
+    spots = [SE3(np.eye(3), np.array([min(p[0], 0.72), p[1], height])) for p in p_WG if abs(p[1]) < 0.25]
+    spot = next(X for X in spots if bench.motion.audit(bench.scene.moved("box", X), carry, lift.phases[0].allowed))
+    status = carried_out(bench, "place(sponge, left_bin)", "pre-place", 0.05, lambda: bench.plant.put("box", spot))
+    assert status is Status.SUCCESS
+    assert place_of(bench.scene, "sponge") == "left_bin"
+    assert any(kind == "refined_again" and "box" in reason for kind, reason in told)
+    assert np.linalg.norm(bench.scene.poses["box"].translation - spot.translation) < 0.002
+
+
+def test_what_is_put_in_the_way_of_a_stroke_ends_it_before_it_is_hit():
+    scene = with_pose(scene_with("box", "carrot", "sponge"), "box", 0.5, 0.3)
+    bench = Bench(scene)
+    assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
+    carrot = bench.scene.poses["carrot"].translation
+    box = SE3(np.eye(3), np.array([carrot[0], carrot[1] - 0.2, bench.scene.poses["box"].translation[2]]))
+    status = carried_out(bench, "wipe(carrot, table, dustpan)", "stroke", 0.1, lambda: bench.plant.put("box", box))
+    assert status is Status.FAILURE
+    assert isinstance(bench.context.failure, SceneChanged)
+    assert "box" in bench.context.failure.reason
+    assert np.linalg.norm(bench.scene.poses["box"].translation - box.translation) < 0.002
