@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from planner.failure import RefinementFailure
-from planner.refinement import Budget, Hints, Refinement, Refiners, Work
+from planner.refinement import Budget, Refinement, Refiners, Work
 from planner.task.learned import Learned
 from planner.task.situation import Situation, Spot
 from planner.task.symbols import GroundAction
@@ -51,7 +51,7 @@ class ActionRefiner:
         learned, is_fresh = self._learned.hints(action, situation)
         avoided = learned.avoid.union(avoid)
         wanted = dict.fromkeys((*first, *self._worked.get(place, ()), *learned.first))
-        hints = Hints(tuple(sample for sample in wanted if sample not in avoided), avoided)
+        hints = replace(learned, first=tuple(sample for sample in wanted if sample not in avoided), avoid=avoided)
         tries = len(hints.first) + (budget.tries if is_fresh else 0)
         work.add("refinements")
         outcome = self._refiners[action.name].refine(

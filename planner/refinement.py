@@ -83,10 +83,16 @@ class Budget:
 
 @dataclass(frozen=True)
 class Hints:
-    """Which samples to try first (what worked, or what was blocked by something now away) and which not again."""
+    """Which samples to try first (what worked, or what was blocked by something now away) and which not again.
+
+    `done` and `failed`: samples with which the primitive was carried out on the same object earlier in this run and
+    came to its effect, or did not, wherever the object lay; the latest last.
+    """
 
     first: tuple[Any, ...] = ()
     avoid: frozenset[Any] = frozenset()
+    done: tuple[Any, ...] = ()
+    failed: tuple[Any, ...] = ()
 
 
 @dataclass

@@ -147,6 +147,10 @@ class SearchThenSample:
         hinted = (*self._samples.get(failure.action, ()), *self.learned.hints(failure.action, situation)[0].first)
         self._take_in(failure, situation, hinted)
 
+    def learn_success(self, refinement: Refinement) -> None:
+        """Take in that an action was carried out as refined and came to its effect."""
+        self.learned.learn_success(refinement.action, refinement.sample)
+
     def _rounds(
         self, scene: SceneState, goal: frozenset[Fact], rng: np.random.Generator, work: Work
     ) -> Solution | NoPlan:

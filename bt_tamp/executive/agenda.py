@@ -19,7 +19,7 @@ class Agenda:
     """What is to be done, and how far it has come.
 
     `facts` states a believed scene in the planner's predicates. `rebuilt` is called whenever `act`
-    has new children.
+    has new children, `done` with what was carried out to its effect.
     """
 
     def __init__(
@@ -28,6 +28,7 @@ class Agenda:
         skills: Mapping[str, Skill],
         facts: Callable[[SceneState], frozenset[Fact]],
         rebuilt: Callable[[str], None],
+        done: Callable[[Refinement], None],
     ) -> None:
         self.goal = goal
         self.facts = facts
@@ -37,6 +38,7 @@ class Agenda:
         self.is_between_actions = True
         self._skills = skills
         self._rebuilt = rebuilt
+        self._done = done
         self._refinements: tuple[Refinement, ...] = ()
         self._running = 0
 
@@ -79,8 +81,10 @@ class Agenda:
         """An action of the plan has started."""
         self.is_between_actions = False
 
-    def complete(self) -> None:
+    def complete(self, run: ActionRun) -> None:
         """The running action is done."""
+        if run.refinement is not None:
+            self._done(run.refinement)
         if self.plan is not None:
             self.executed.append(self.plan.steps[self._running].action)
         self._running += 1
@@ -97,7 +101,7 @@ class Agenda:
             run = ActionRun(action, self._refinements[index])
             subtree = self._skills[action.name].subtree(run, context)
             name, subtree.name = subtree.name, "do"
-            self.act.add_child(sequence(name, Begin(self, action, context), subtree, Complete(self, action, context)))
+            self.act.add_child(sequence(name, Begin(self, action, context), subtree, Complete(self, run, context)))
         self.act.add_child(Waiting())
         self._rebuilt(why)
 
@@ -118,9 +122,9 @@ class Begin(Behaviour):
 class Complete(Behaviour):
     """Marks the end of an action, and lets a tick pass so that the rest of the plan is looked at before it goes on."""
 
-    def __init__(self, agenda: Agenda, action: GroundAction, context: SkillContext) -> None:
+    def __init__(self, agenda: Agenda, run: ActionRun, context: SkillContext) -> None:
         super().__init__("complete")
-        self._agenda, self._action, self._context = agenda, action, context
+        self._agenda, self._run, self._context = agenda, run, context
         self._marked = False
 
     def initialise(self) -> None:
@@ -130,8 +134,8 @@ class Complete(Behaviour):
         if self._marked:
             return Status.SUCCESS
         self._marked = True
-        self._agenda.complete()
-        self._context.report("action_done", action=str(self._action))
+        self._agenda.complete(self._run)
+        self._context.report("action_done", action=str(self._run.action))
         return Status.RUNNING
 
 

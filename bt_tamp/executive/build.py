@@ -70,7 +70,7 @@ def build(
         contact_mode=contact.mode,
         report=report,
     )
-    agenda = Agenda(goal, thinker.skills, planner.search.facts, tree_changed)
+    agenda = Agenda(goal, thinker.skills, planner.search.facts, tree_changed, planner.search.learn_success)
     tree = mission(agenda, context, planning(LiftOff(context), PlanNode(planner, agenda, context)))
     return Machine(plant, robot, belief, context, agenda, planner, tree)
 

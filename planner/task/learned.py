@@ -109,6 +109,7 @@ class Learned:
         self._grasping = grasping(domain)
         self._cases: dict[tuple[GroundAction, Spot], Case] = {}
         self._never: dict[GroundAction, str] = {}
+        self._executed: dict[tuple[str, str], list[tuple[Any, bool]]] = {}
         self._seen: dict[str, Whereabouts | None] = {}
         self._is_lenient = False
         self._binding: frozenset[str] | None = None
@@ -143,6 +144,7 @@ class Learned:
         situation = Situation.now(scene)
         own = situation.spot(failure.action.args[0])
         case = self._cases.setdefault((failure.action, own), Case())
+        self._keep_executed(failure.action, failure.sample, False)
         case.samples[failure.sample] = Kept(failure.reason, None, is_executed=True)
         case.reason = failure.reason
         self._watch(situation, {own})
@@ -150,18 +152,29 @@ class Learned:
             case.has_failed = True
         return case.has_failed
 
+    def learn_success(self, action: GroundAction, sample: Any) -> None:
+        """Take in that an action was carried out with a sample and came to its effect."""
+        self._keep_executed(action, sample, True)
+
+    def _keep_executed(self, action: GroundAction, sample: Any, is_done: bool) -> None:
+        if sample is not None:
+            self._executed.setdefault((action.name, action.args[0]), []).append((sample, is_done))
+
     def hints(self, action: GroundAction, situation: Situation) -> tuple[Hints, bool]:
         """Samples to try first (what blocked them is away) and to avoid; and are new samples worth trying?"""
+        executed = self._executed.get((action.name, action.args[0]), [])
+        done = tuple(sample for sample, is_done in executed if is_done)
+        failed = tuple(sample for sample, is_done in executed if not is_done)
         case = self._cases.get((action, situation.spot(action.args[0])))
         if case is None:
-            return Hints(), True
+            return Hints(done=done, failed=failed), True
         first = [
             sample
             for sample, kept in case.samples.items()
             if kept.needs is not None and all(map(situation.is_away, kept.needs))
         ]
         avoid = frozenset(sample for sample in case.samples if sample not in first)
-        return Hints(tuple(first), avoid), case.failures < MAX_FRESH_FAILURES
+        return Hints(tuple(first), avoid, done, failed), case.failures < MAX_FRESH_FAILURES
 
     def constraints(self) -> dict[GroundAction, Options]:
         """What each failed action needs: one of the sets of spots left. An empty set of sets: it is out for good."""

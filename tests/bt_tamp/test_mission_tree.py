@@ -85,7 +85,7 @@ class World:
         self.context = context
         steps = {step.action: step for step in ROUTE.steps}
         skill = SimpleNamespace(subtree=lambda run, _: Scripted(self, steps[run.action]))
-        self.agenda = Agenda(ROUTE.goal, {"go": skill}, lambda _: self.facts, lambda _: None)
+        self.agenda = Agenda(ROUTE.goal, {"go": skill}, lambda _: self.facts, lambda _: None, lambda _: None)
         self.mission = mission(self.agenda, context, Plans(self))
         self.t = 0.0
 

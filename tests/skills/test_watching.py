@@ -28,9 +28,8 @@ def carried_out(bench: Bench, text: str, phase: str, share: float, disturb: Call
         if tree.root.status is not Status.RUNNING:
             assert disturbed, f"{text} never came to {phase}"
             return tree.root.status
-        now = bench.context.phase
-        is_due = now is not None and now.name == phase and run.running(now) is not None
-        if is_due and not disturbed and bench.context.controller.time_in_reference >= share * now.trajectory.duration:
+        now, passed = run.running(bench.context.phase), bench.context.controller.time_in_reference
+        if not disturbed and now is not None and now.name == phase and passed >= share * now.trajectory.duration:
             disturb()
             disturbed = True
         bench.run(10)
