@@ -238,12 +238,14 @@ class Learned:
         self._drop(lambda spot: spot.left_by is not None)
 
     def retract(self, tries: int) -> None:
-        """Drop sampled facts established with fewer tries. What failed in execution is still avoided, proofs stay."""
+        """Drop sampled facts established with fewer tries. Proofs stay; what failed in execution is still avoided, and
+        an action that did so twice as often as it takes to count as failed is out as its object lies."""
         self._is_lenient, self._binding = True, None
         for key, case in list(self._cases.items()):
             if not case.is_proof and case.tries < tries:
                 executed = {sample: kept for sample, kept in case.samples.items() if kept.is_executed}
-                self._cases[key] = Case(executed, reason=case.reason)
+                is_out = len(executed) >= 2 * MAX_EXECUTION_FAILURES
+                self._cases[key] = Case(executed, is_out, reason=case.reason)
 
     def culprits(self) -> frozenset[str]:
         """Bodies that are known to be in the way of something, or that can't be handled as they lie."""

@@ -263,3 +263,12 @@ def test_sentences_name_what_obstructs(learned, scene):
         "wipe(crumb, table, dustpan) needs mug or jug and pot out of the way",
     ]
     assert learned.culprits() == {"mug", "jug", "pot"}
+
+
+def test_what_keeps_failing_in_execution_is_given_up_although_budgets_are_widened(learned, scene):
+    possible = []
+    for n in range(1, 9):
+        if learned.learn_execution(GraspSlipped(PICK, "it slipped", n), scene):
+            learned.retract(1000)
+        possible.append(not learned.ungraspable(scene))
+    assert possible == [True] * 5 + [False] * 3
