@@ -203,15 +203,19 @@ def _in_order(samples: Iterable[Any], hints: Hints) -> Iterable[Any]:
 def _culprits(
     action: GroundAction, sample: Any, scene: SceneState, attempt: Attempt, outcome: MotionFailure | Unfit
 ) -> frozenset[str]:
-    """Movable bodies without which the sample works and which its motion then would hit; empty if it doesn't."""
-    if not outcome.culprits:
+    """Movable bodies without which the sample works and which its motion then would hit; empty if it doesn't.
+
+    The action's own objects are none: without them there is nothing to do.
+    """
+    own = frozenset(action.args)
+    if not outcome.culprits or outcome.culprits & own:
         return frozenset()
     suspects = outcome.culprits
     for _ in range(len(scene.poses)):
         again = attempt(sample, scene.without(suspects))
         if isinstance(again, tuple):
             return _needed(suspects, sample, scene, attempt)
-        if not again.culprits or again.culprits <= suspects:
+        if not again.culprits or again.culprits <= suspects or again.culprits & own:
             return frozenset()
         suspects = suspects | again.culprits
     return frozenset()
