@@ -11,6 +11,7 @@ from py_trees.trees import BehaviourTree
 
 from bt_tamp.executive.audit import ContactAudit
 from bt_tamp.executive.build import CONTROL_EVERY, TREE_EVERY, Machine, build
+from bt_tamp.executive.force_audit import ForceAudit
 from bt_tamp.options import RunOptions
 from bt_tamp.report.recorder import RunRecorder
 from bt_tamp.report.result import Outcome, RunResult
@@ -34,6 +35,14 @@ class Tally:
     peak_force_n: float = 0.0
     learned: dict[str, None] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
+
+
+@dataclass(frozen=True)
+class Audits:
+    """What judges a run by the engine's truth."""
+
+    contacts: ContactAudit
+    forces: ForceAudit
 
 
 @dataclass(frozen=True)
@@ -61,13 +70,13 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
         recorder.tree(machine.mission.root, why)
 
     machine = build(scenario, options, report, tree_changed)
-    audit = ContactAudit(machine.robot, scenario)
+    audits = Audits(ContactAudit(machine.robot, scenario), ForceAudit(machine.robot))
     report("run_started", scene=scenario.name, seed=scenario.seed)
     try:
-        ending = _run(machine, options, recorder, audit, tally, clock)
+        ending = _run(machine, options, recorder, audits, tally, clock)
     except KeyboardInterrupt:
         ending = Ending("interrupted", "the run was interrupted")
-    result = _result(machine, scenario, ending, audit, tally)
+    result = _result(machine, scenario, ending, audits, tally)
     recorder.tree(machine.mission.root, "end")
     report("run_ended", outcome=result.outcome, sentence=result.reason)
     recorder.finish(result)
@@ -76,7 +85,7 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
 
 
 def _run(
-    machine: Machine, options: RunOptions, recorder: RunRecorder, audit: ContactAudit, tally: Tally, clock: list[float]
+    machine: Machine, options: RunOptions, recorder: RunRecorder, audits: Audits, tally: Tally, clock: list[float]
 ) -> Ending:
     plant, context = machine.plant, machine.context
     tree = BehaviourTree(machine.mission.root)
@@ -93,13 +102,13 @@ def _run(
                 return ending
         tau = context.controller.update(observation)
         plant.apply(Command(tau, context.grip.command(observation)))
-        _account(machine, recorder, audit, tally, tick)
+        _account(machine, recorder, audits, tally, tick)
         for _ in range(CONTROL_EVERY):
             plant.step()
         tick += 1
 
 
-def _account(machine: Machine, recorder: RunRecorder, audit: ContactAudit, tally: Tally, tick: int) -> None:
+def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally, tick: int) -> None:
     context = machine.context
     controller, observation = context.controller, context.observation
     force = controller.contact_force if controller.contact else 0.0
@@ -114,11 +123,16 @@ def _account(machine: Machine, recorder: RunRecorder, audit: ContactAudit, tally
         recorder.sample(observation, Reference(q_ref, p_ref, wanted), force)
         contacts = machine.plant.contacts()
         running = str(machine.agenda.running or "planning")
-        audit.look(observation.t, contacts, context, running)
+        audits.contacts.look(observation.t, contacts, context, running)
+        audits.forces.look(observation.t, contacts, context, running)
         if recorder.contacts_due(observation.t):
             recorder.contacts(
                 observation.t,
-                [Contact(c.first, c.second, c.position, c.force) for c in contacts if audit.involves_robot(c, context)],
+                [
+                    Contact(c.first, c.second, c.position, c.force)
+                    for c in contacts
+                    if audits.contacts.involves_robot(c, context)
+                ],
             )
 
 
@@ -138,7 +152,7 @@ def _ending(machine: Machine, options: RunOptions) -> Ending | None:
     return None
 
 
-def _result(machine: Machine, scenario: Scenario, ending: Ending, audit: ContactAudit, tally: Tally) -> RunResult:
+def _result(machine: Machine, scenario: Scenario, ending: Ending, audits: Audits, tally: Tally) -> RunResult:
     context, agenda, thinking = machine.context, machine.agenda, machine.planner.thinking
     known = agenda.facts(context.scene)
     held = context.scene.held
@@ -163,7 +177,8 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audit: Contact
         wall_s=time.perf_counter() - tally.started,
         peak_contact_force_n=tally.peak_force_n,
         torque_limit_violations=context.controller.torque_limit_violations,
-        unintended_contacts=tuple(audit.found),
+        unintended_contacts=tuple(audits.contacts.found),
+        pressed=audits.forces.found,
         peak_rss_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         energy_j=tally.energy_j,
     )

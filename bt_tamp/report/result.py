@@ -34,6 +34,18 @@ class UnintendedContact:
 
 
 @dataclass(frozen=True)
+class PressedMotion:
+    """A stroke or a drag, and the engine's true normal force from 0.5 s after touchdown until it lifted, in N: mean,
+    root mean square of its difference from the target, and peak."""
+
+    action: str
+    target_n: float
+    mean_n: float
+    rms_error_n: float
+    peak_n: float
+
+
+@dataclass(frozen=True)
 class RunResult:
     """One run. Field names are the keys of `result.json`.
 
@@ -62,6 +74,7 @@ class RunResult:
     peak_contact_force_n: float = 0.0
     torque_limit_violations: int = 0
     unintended_contacts: tuple[UnintendedContact, ...] = ()
+    pressed: tuple[PressedMotion, ...] = ()
     peak_rss_mb: float = 0.0
     energy_j: float = 0.0
     reproducible: bool = True
@@ -80,6 +93,7 @@ class RunResult:
         try:
             data: dict[str, Any] = json.loads(text)
             data["unintended_contacts"] = tuple(UnintendedContact(**c) for c in data["unintended_contacts"])
+            data["pressed"] = tuple(PressedMotion(**motion) for motion in data["pressed"])
             for key in ("plan", "executed", "learned"):
                 data[key] = tuple(data[key])
             return RunResult(**data)

@@ -129,6 +129,12 @@ class _Teller:
             f" {counted(result.rounds, 'round')}, {counted(result.replans, 'replan')}). Contact force reached"
             f" {result.peak_contact_force_n:.1f} N; {counted(len(result.unintended_contacts), 'unintended contact')}."
         )
+        for motion in result.pressed:
+            self._say(
+                f"{motion.action} pressed with {motion.mean_n:.2f} N, {motion.target_n:g} N wanted: off by"
+                f" {motion.rms_error_n / motion.target_n:.1%} (RMS), peak {motion.peak_n:.1f} N",
+                "  - ",
+            )
         for touch in result.unintended_contacts:
             doing = " ".join(part for part in (touch.action, touch.phase) if part)
             self._say(f"{touch.first} and {touch.second} at {touch.t:.1f} s, {touch.force_n:.1f} N ({doing})", "  - ")

@@ -40,7 +40,7 @@ ROOT = Path(__file__).parents[2]
 
 KEYS = (
     "scenario seed outcome goal plan executed learned rounds replans planning_cpu_s planning_wall_s robot_s wall_s "
-    "peak_contact_force_n torque_limit_violations unintended_contacts peak_rss_mb energy_j reproducible"
+    "peak_contact_force_n torque_limit_violations unintended_contacts pressed peak_rss_mb energy_j reproducible"
 ).split()
 
 

@@ -2,7 +2,7 @@ import pytest
 
 from bt_tamp.report.events import Event, read_events
 from bt_tamp.report.live import PlainLines, watcher
-from bt_tamp.report.result import RunResult, UnintendedContact
+from bt_tamp.report.result import PressedMotion, RunResult, UnintendedContact
 from bt_tamp.report.story import WIDTH, story
 
 FIRST = ["pick(book, table)", "place(book, crate)"]
@@ -42,6 +42,7 @@ RESULT = RunResult(
     "no plan found",
     {"in_bin(book, crate)": False},
     unintended_contacts=(UnintendedContact(1.0, "finger", "vase", 3.25, "drag(book, table)", "descend"),),
+    pressed=(PressedMotion("drag(book, table)", 8.0, 8.1, 0.2, 9.5),),
 )
 
 
@@ -62,6 +63,7 @@ def test_the_story_tells_plans_failures_lessons_deeds_and_end_in_their_order() -
         "Round 3: with what had been learned, no sequence of actions led to the goal.",
         "No plan was found within the budget: no plan found.",
         "in_bin(book, crate) did not hold",
+        "drag(book, table) pressed with 8.10 N, 8 N wanted: off by 2.5% (RMS), peak 9.5 N",
         "finger and vase at 1.0 s, 3.2 N (drag(book, table) descend)",
     ]
     places = [told.find(text) for text in expected]
