@@ -12,6 +12,7 @@ from py_trees.trees import BehaviourTree
 from bt_tamp.executive.audit import ContactAudit
 from bt_tamp.executive.build import CONTROL_EVERY, TREE_EVERY, Machine, build
 from bt_tamp.executive.force_audit import ForceAudit
+from bt_tamp.export.snapshot import Results
 from bt_tamp.options import RunOptions
 from bt_tamp.report.recorder import RunRecorder
 from bt_tamp.report.result import Outcome, RunResult
@@ -29,8 +30,10 @@ MAX_ACTIONS = 200
 
 @dataclass
 class Tally:
-    """What is counted while a run goes on."""
+    """What is counted and remembered while a run goes on; `t` is simulated time in s."""
 
+    t: float = 0.0
+    results: Results = field(default_factory=Results)
     energy_j: float = 0.0
     peak_force_n: float = 0.0
     learned: dict[str, None] = field(default_factory=dict)
@@ -59,12 +62,11 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
     Raises PddlError for hand-written PDDL that doesn't fit, ValueError for options that don't.
     """
     tally = Tally()
-    clock = [0.0]
 
     def report(kind: str, **data: Any) -> None:
         if kind == "learned":
             tally.learned[data["sentence"]] = None
-        _report(recorder, clock[0], kind, data, machine.planner.thinking.rounds)
+        _report(recorder, tally.t, kind, data, machine.planner.thinking.rounds)
 
     def tree_changed(why: str) -> None:
         recorder.tree(machine.mission.root, why)
@@ -73,11 +75,11 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
     audits = Audits(ContactAudit(machine.robot, scenario), ForceAudit(machine.robot))
     report("run_started", scene=scenario.name, seed=scenario.seed)
     try:
-        ending = _run(machine, options, recorder, audits, tally, clock)
+        ending = _run(machine, options, recorder, audits, tally)
     except KeyboardInterrupt:
         ending = Ending("interrupted", "the run was interrupted")
     result = _result(machine, scenario, ending, audits, tally)
-    recorder.tree(machine.mission.root, "end")
+    recorder.tree(machine.mission.root, "end", tally.results)
     report("run_ended", outcome=result.outcome, sentence=result.reason)
     recorder.finish(result)
     machine.plant.close()
@@ -85,14 +87,19 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
 
 
 def _run(
-    machine: Machine, options: RunOptions, recorder: RunRecorder, audits: Audits, tally: Tally, clock: list[float]
+    machine: Machine,
+    options: RunOptions,
+    recorder: RunRecorder,
+    audits: Audits,
+    tally: Tally,
 ) -> Ending:
     plant, context = machine.plant, machine.context
     tree = BehaviourTree(machine.mission.root)
+    tree.add_visitor(tally.results)
     tick = 0
     while True:
         observation = plant.observe()
-        clock[0] = observation.t
+        tally.t = observation.t
         context.observation = observation
         if tick % TREE_EVERY == 0:
             context.scene = machine.belief.update(observation, context.grip.is_closing)

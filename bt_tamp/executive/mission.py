@@ -68,7 +68,10 @@ class GoalReached(Behaviour):
             return Status.FAILURE
         if self._since is None:
             self._since = observation.t
-        return Status.SUCCESS if observation.t - self._since >= GOAL_TIME else Status.FAILURE
+        if observation.t - self._since < GOAL_TIME:
+            return Status.FAILURE
+        self.feedback_message = ""
+        return Status.SUCCESS
 
 
 class PlanStillGood(Behaviour):

@@ -4,8 +4,10 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
+from uuid import UUID
 
 import py_trees
+from py_trees.visitors import VisitorBase
 
 Kind = Literal["sequence", "selector", "parallel", "decorator", "condition", "action"]
 Status = Literal["SUCCESS", "FAILURE", "RUNNING", "INVALID"]
@@ -65,15 +67,33 @@ class TreeNode:
             yield from child.walk()
 
 
-def snapshot(root: py_trees.behaviour.Behaviour) -> TreeNode:
-    """The tree under `root` as it stands now."""
+class Results(VisitorBase):
+    """Remembers how each node ended last: a finished part of a tree forgets it as soon as the tree above is stopped."""
+
+    def __init__(self) -> None:
+        super().__init__(full=False)
+        self.of: dict[UUID, py_trees.common.Status] = {}
+
+    def run(self, behaviour: py_trees.behaviour.Behaviour) -> None:
+        """Look at a node that was just ticked."""
+        if behaviour.status == py_trees.common.Status.RUNNING:
+            self.of.pop(behaviour.id, None)
+        else:
+            self.of[behaviour.id] = behaviour.status
+
+
+def snapshot(root: py_trees.behaviour.Behaviour, results: Results | None = None) -> TreeNode:
+    """The tree under `root` as it stands now; nodes that were stopped since show how they ended, if `results` knows."""
+    status = root.status
+    if results is not None and status == py_trees.common.Status.INVALID:
+        status = results.of.get(root.id, status)
     return TreeNode(
         name=root.name,
         kind=_kind(root),
         memory=bool(getattr(root, "memory", False)),
-        status=root.status.value,
+        status=status.value,
         message=root.feedback_message or "",
-        children=tuple(snapshot(child) for child in root.children),
+        children=tuple(snapshot(child, results) for child in root.children),
     )
 
 

@@ -6,7 +6,7 @@ from typing import Any, Protocol, TextIO
 
 import py_trees
 
-from bt_tamp.export.snapshot import TreeNode, snapshot
+from bt_tamp.export.snapshot import Results, TreeNode, snapshot
 from bt_tamp.report.events import Event
 from bt_tamp.report.folder import EVENTS, PDDL, PLANS, RESULT, SCENARIO, SIGNALS, TREES, RunFolder
 from bt_tamp.report.result import RunResult
@@ -97,9 +97,9 @@ class RunRecorder:
             self._contact_next = t + self._contact_period - 1e-6
             self._signals.add_contacts(t, contacts)
 
-    def tree(self, root: py_trees.behaviour.Behaviour, why: str) -> None:
-        """The tree as it stands: `why` is a word or two ("round-1", "rebuilt", "end") for the file's name."""
-        self.last_tree = snapshot(root)
+    def tree(self, root: py_trees.behaviour.Behaviour, why: str, results: Results | None = None) -> None:
+        """The tree as it stands: `why` is a word or two ("planned", "skipped", "end") for the file's name."""
+        self.last_tree = snapshot(root, results)
         if self.folder is None:
             return
         from bt_tamp.export.svg import to_svg
