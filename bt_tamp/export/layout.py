@@ -22,7 +22,7 @@ NOTE_LIMIT = 110
 BELOW_LIMIT = 34
 MAX_WIDTH = 1500.0
 MAX_HEIGHT = 1100.0
-COLUMNS_WIDTH = 1120.0
+COLUMNS_WIDTH = 1500.0
 BAND_GAP = 46.0
 BUS = 18.0
 
@@ -94,7 +94,10 @@ def arrange(root: TreeNode) -> Placed:
     if tidy.right <= MAX_WIDTH:
         return tidy
     plain = outline(root)
-    return plain if plain.bottom <= MAX_HEIGHT else outline(root, _widest(root))
+    if plain.bottom <= MAX_HEIGHT:
+        return plain
+    spreads = (outline(root, node) for node in root.walk() if len(node.children) > 1)
+    return min(spreads, key=lambda placed: placed.bottom, default=plain)
 
 
 def outline(root: TreeNode, spread: TreeNode | None = None) -> Placed:
@@ -132,11 +135,6 @@ def _bands(parent: TreeNode, left: float, top: float) -> tuple[Placed, ...]:
 def _moved(placed: Placed, x: float, y: float) -> Placed:
     children = tuple(_moved(child, x, y) for child in placed.children)
     return replace(placed, x=placed.x + x, y=placed.y + y, children=children)
-
-
-def _widest(root: TreeNode) -> TreeNode:
-    """The node with the most children; of several, the first one."""
-    return max(root.walk(), key=lambda node: len(node.children))
 
 
 def top_down(root: TreeNode) -> Placed:
