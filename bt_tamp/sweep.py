@@ -17,10 +17,12 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_
 
 @dataclass(frozen=True)
 class Job:
-    """One run: a scene by name or path, and its options, the seed among them."""
+    """One run: a scene by name or path, its options, the seed among them, and a digest of the scene file's text (""
+    for none), so that a run of an edited file is another run."""
 
     scene: str
     options: RunOptions
+    digest: str = ""
 
 
 @dataclass(frozen=True)

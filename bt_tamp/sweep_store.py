@@ -8,7 +8,6 @@ from pathlib import Path
 from types import TracebackType
 
 from bt_tamp.errors import UserError
-from bt_tamp.options import RunOptions
 from bt_tamp.sweep import Finished, Job
 
 UNFINISHED = ("crashed", "killed")
@@ -77,10 +76,11 @@ class SweepStore:
 
 
 def _key(job: Job) -> tuple[str, int, str]:
-    return job.scene, job.options.seed, options_text(job.options)
+    return job.scene, job.options.seed, _distinction(job)
 
 
-def options_text(options: RunOptions) -> str:
-    """The options that tell two runs of one scene and seed apart, as JSON."""
-    data = {name: value for name, value in asdict(options).items() if name not in ("seed", "window")}
+def _distinction(job: Job) -> str:
+    """What tells two runs of one scene and seed apart, as JSON."""
+    data = {name: value for name, value in asdict(job.options).items() if name not in ("seed", "window")}
+    data |= {"digest": job.digest} if job.digest else {}
     return json.dumps(data, sort_keys=True, default=str)

@@ -79,15 +79,18 @@ def call(arguments: argparse.Namespace) -> int:
 
 def _jobs(arguments: argparse.Namespace) -> "list[Job]":
     from dataclasses import replace
+    from hashlib import sha256
 
     from bt_tamp.sweep import Job
+    from scenarios.library import scenario_path
     from scenarios.load import load_scenario
 
     options = options_of(arguments)
+    digests = {}
     for scene in arguments.scenes:
         load_scenario(scene)
-    scenes = dict.fromkeys(arguments.scenes)
-    return [Job(scene, replace(options, seed=seed)) for scene in scenes for seed in arguments.seeds]
+        digests[scene] = sha256(scenario_path(scene).read_bytes()).hexdigest()[:16]
+    return [Job(scene, replace(options, seed=seed), digests[scene]) for scene in digests for seed in arguments.seeds]
 
 
 def _run(jobs: "list[Job]", processes: int, store: "SweepStore") -> None:

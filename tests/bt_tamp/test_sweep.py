@@ -55,6 +55,7 @@ def test_a_result_is_found_again_by_scene_seed_and_options(tmp_path: Path) -> No
     with SweepStore(tmp_path / "s.db") as store:
         row = store.get(job(3))
         others = [job(4), job(3, "fig1"), Job("fig2", RunOptions(seed=3, contact="impedance"))]
+        others += [Job("fig2", RunOptions(seed=3), digest="of another text")]
 
         assert row is not None
         assert json.loads(row.result or "")["robot_s"] == 12.5
