@@ -75,6 +75,7 @@ class NoTaskPlan:
 def resume_at(plan: TaskPlan, facts: frozenset[Fact], first: int = 0) -> int | None:
     """The largest k ≥ `first` such that the steps from k on are applicable one after the other and reach the goal.
 
+    A step that isn't applicable because all it adds is there already is passed over: another one brought it about.
     len(plan.steps) when the goal holds already; None when no such k exists.
     """
     return next((k for k in range(len(plan.steps), first - 1, -1) if _leads_to_goal(plan, facts, k)), None)
@@ -82,7 +83,8 @@ def resume_at(plan: TaskPlan, facts: frozenset[Fact], first: int = 0) -> int | N
 
 def _leads_to_goal(plan: TaskPlan, facts: frozenset[Fact], k: int) -> bool:
     for step in plan.steps[k:]:
-        if not step.applicable(facts):
+        if step.applicable(facts):
+            facts = step.apply(facts)
+        elif not step.adds <= facts:
             return False
-        facts = step.apply(facts)
     return plan.goal <= facts
