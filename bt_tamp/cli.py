@@ -29,7 +29,7 @@ COMMANDS = {
 
 EPILOG = """\
 exit codes: 0 goal reached, 2 wrong input, 10 proven infeasible, 11 no plan within the budget,
-12 execution gave up, 130 interrupted
+12 execution gave up, 130 interrupted, 1 an error in the program
 """
 
 WRONG_INPUT = 2

@@ -45,7 +45,7 @@ def call(arguments: argparse.Namespace) -> int:
 
     with RunRecorder(scenario, folder, watcher(sys.stdout)) as recorder:
         result = run_scenario(scenario, options, recorder)
-    if arguments.render and not options.window and result.outcome != "interrupted":
+    if arguments.render and not options.window and result.outcome not in ("interrupted", "crashed"):
         _render(folder.path)
     with outliving_a_closed_pipe():
         print(_closing(result))
@@ -69,6 +69,8 @@ def _closing(result: "RunResult") -> str:
     if result.outcome == "goal_reached":
         said = f"Goal reached in {result.robot_s:.0f} s of robot time ({result.wall_s:.0f} s of real time)"
     else:
+        if result.outcome == "crashed":
+            return f"Goal not reached: an error in the program, {result.reason}; crash.txt tells where."
         missing = [literal for literal, holds in result.goal.items() if not holds]
         said = f"Goal not reached: {result.reason.rstrip('.')}; missing: {', '.join(missing) or 'rest at the end'}"
     by_place: dict[str, list[str]] = {}

@@ -2,6 +2,7 @@
 
 import resource
 import time
+import traceback
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
+from bt_tamp.errors import one_line_of
 from bt_tamp.executive.audit import ContactAudit
 from bt_tamp.executive.build import CONTROL_EVERY, TREE_EVERY, Machine, build
 from bt_tamp.executive.force_audit import ForceAudit
@@ -57,7 +59,8 @@ class Ending:
 
 
 def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder) -> RunResult:
-    """Plan and act until the goal is reached or given up. An interruption (Ctrl-C) ends the run with a result too.
+    """Plan and act until the goal is reached or given up. An interruption (Ctrl-C) or an error in our own code ends the
+    run with a result too.
 
     Raises PddlError for hand-written PDDL that doesn't fit, ValueError for options that don't.
     """
@@ -78,6 +81,9 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
         ending = _run(machine, options, recorder, audits, tally)
     except KeyboardInterrupt:
         ending = Ending("interrupted", "the run was interrupted")
+    except Exception as error:  # Whatever it is: the run's folder is worth most when something went wrong.
+        ending = Ending("crashed", f"{type(error).__name__}: {one_line_of(error)}")
+        recorder.crash(traceback.format_exc())
     result = _result(machine, scenario, ending, audits, tally)
     recorder.tree(machine.mission.root, "end", tally.results)
     report("run_ended", outcome=result.outcome, sentence=result.reason)

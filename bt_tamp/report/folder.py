@@ -16,9 +16,10 @@ EVENTS = "events.jsonl"
 SCENARIO = "scenario.json"
 SIGNALS = "signals.npz"
 VIDEO = "video.mp4"
+CRASH = "crash.txt"
 PDDL, PLANS, TREES = "pddl", "plans", "trees"
 
-OWN = (RESULT, EVENTS, SCENARIO, SIGNALS, VIDEO, PDDL, PLANS, TREES)
+OWN = (RESULT, EVENTS, SCENARIO, SIGNALS, VIDEO, CRASH, PDDL, PLANS, TREES)
 """Everything a run writes: what `--force` clears, and nothing else."""
 
 

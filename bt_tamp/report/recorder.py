@@ -8,7 +8,7 @@ import py_trees
 
 from bt_tamp.export.snapshot import Results, TreeNode, snapshot
 from bt_tamp.report.events import Event
-from bt_tamp.report.folder import EVENTS, PDDL, PLANS, RESULT, SCENARIO, SIGNALS, TREES, RunFolder
+from bt_tamp.report.folder import CRASH, EVENTS, PDDL, PLANS, RESULT, SCENARIO, SIGNALS, TREES, RunFolder
 from bt_tamp.report.result import RunResult
 from bt_tamp.report.signals import Contact, Reference, SignalTable
 from scenarios.scenario import Scenario
@@ -119,6 +119,10 @@ class RunRecorder:
     def plan(self, name: str, text: str) -> None:
         """The plan of a round as text, one action a line."""
         self._text(f"{PLANS}/{name}.txt", text if text.endswith("\n") else text + "\n")
+
+    def crash(self, trace: str) -> None:
+        """An error in our own code ended the run; `trace` is its traceback."""
+        self._text(CRASH, trace)
 
     def finish(self, result: RunResult) -> None:
         """The run has ended: everything is written, `result.json` last."""

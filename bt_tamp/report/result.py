@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-Outcome = Literal["goal_reached", "planned", "proven_infeasible", "no_plan", "gave_up", "interrupted"]
+Outcome = Literal["goal_reached", "planned", "proven_infeasible", "no_plan", "gave_up", "interrupted", "crashed"]
 
 EXIT_CODES: Mapping[Outcome, int] = {
     "goal_reached": 0,
@@ -14,8 +14,9 @@ EXIT_CODES: Mapping[Outcome, int] = {
     "no_plan": 11,
     "gave_up": 12,
     "interrupted": 130,
+    "crashed": 1,
 }
-"""Exit code of the command line by outcome. Wrong input is 2."""
+"""Exit code of the command line by outcome. Wrong input is 2; "crashed" is an error in our own code."""
 
 
 @dataclass(frozen=True)

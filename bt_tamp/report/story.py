@@ -152,6 +152,7 @@ _ENDINGS = {
     "proven_infeasible": "The goal was proven out of reach: {reason}.",
     "no_plan": "No plan was found within the budget: {reason}.",
     "gave_up": "The run gave up: {reason}.",
+    "crashed": "The run ended with an error in the program ({reason}); crash.txt in its folder tells where.",
     "interrupted": "The run was interrupted before its end.",
 }
 

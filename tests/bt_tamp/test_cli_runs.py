@@ -9,6 +9,7 @@ import pytest
 
 from bt_tamp.cli import COMMANDS, main
 from bt_tamp.display import has_display
+from planner.search_then_sample import SearchThenSample
 
 TABLE = """\
 version: 1
@@ -190,3 +191,17 @@ def test_an_interrupted_run_says_so_in_a_whole_folder(tmp_path: Path) -> None:
     assert str(tmp_path / "run") in said
     assert json.loads((tmp_path / "run" / "result.json").read_text())["outcome"] == "interrupted"
     assert (tmp_path / "run" / "signals.npz").exists()
+
+
+def test_an_error_in_our_own_code_ends_a_run_with_a_whole_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(self: SearchThenSample, *_: object) -> None:
+        raise RuntimeError("broken on purpose")
+
+    monkeypatch.setattr(SearchThenSample, "plan", broken)
+
+    assert main(["run", "fig2", "--out", str(tmp_path / "run")]) == 1
+    assert "broken on purpose" in capsys.readouterr().out
+    assert "RuntimeError" in (tmp_path / "run" / "crash.txt").read_text()
+    assert json.loads((tmp_path / "run" / "result.json").read_text())["outcome"] == "crashed"
