@@ -1,5 +1,6 @@
 """The arm's one controller: position, impedance and force laws on one torque QP, without bumps between them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,10 @@ from sim.wrench import Wrench
 from skills.control.bridge import Bridge
 from skills.control.contact import ContactWrench, Touch
 from skills.control.force import ForceLoop
-from skills.control.reference import Course, Reference
+from skills.control.limits import ApproachLimit, Row
+from skills.control.momentum import MomentumObserver
+from skills.control.reference import Course, Reference, near_contact
+from skills.control.safety import Collision, ForceTooHigh, Guard, SafetyLimits, Stop
 from skills.control.state import ArmState, Target, measure, target_at
 from skills.control.tasks import HybridTask, JointTask, PoseTask, PostureTask, Task, pose_error
 from skills.control.torque_qp import TorqueQP
@@ -23,9 +27,9 @@ LOST_AFTER = 0.014
 LOST_AFTER_TOUCH = 0.25
 """The same while touching down, when the tool may bounce."""
 
-GUARDED_DAMPING = 40.0
-"""Velocity gain in 1/s on the way to contact: low, for what a hard surface does to the velocity
-comes back as torque at once."""
+GUARDED, GUARDED_DAMPING = 400.0, 25.0
+"""Gains in 1/s² and 1/s on the way to contact: low, for what a hard surface does to the velocity comes back as
+torque at once, and until the touch is noticed the arm goes on pressing with the stiffness."""
 
 PRESSED_SETTLING = 0.1
 """Seconds that the force is left to settle after it was ramped up."""
@@ -35,6 +39,22 @@ AT_REST = 0.02
 
 ARRIVED = 0.03
 """Joint error in rad below which position mode counts as arrived."""
+
+APPROACH_SPEED = 0.02
+"""Metres per second at which a reference until contact meets a surface: a stiff one answers with a force of
+speed · √(stiffness · moved mass), 5 N for the sponge."""
+
+APPROACH_LIMIT = 0.06
+"""Metres per second towards the surface that the QP allows while contact is sought or kept."""
+
+COMPENSATED = 0.25
+"""Share of each joint's torque that may go into what the model lacks."""
+
+COMPENSATION_RATE = 150.0
+"""Nm/s at which that may change: joint friction turns round within 20 ms."""
+
+YIELDING, YIELDING_DAMPING = 100.0, 30.0
+"""1/s² and 1/s with which the arm holds after a collision: it gives way."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +71,26 @@ class ArmController:
     """Turns observations into joint torques, one call of `update` every `period` seconds.
 
     What it follows is set by `follow` and `hold`, which take effect at the next `update`. It holds
-    at first. Losing contact while pressed, it holds and says so in `contact_lost`.
+    at first. Losing contact while pressed, it holds and says so in `contact_lost`. When a safety limit is about
+    to be passed or something unexpected pushes, it comes to rest, holds and says why in `stopped`, until it is
+    told what to follow next. `lap` is told which part of an update has just been done, for who measures.
     """
 
-    def __init__(self, robot: RobotModel, period: float = 0.002) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        period: float = 0.002,
+        safety: SafetyLimits | None = None,
+        lap: Callable[[str], None] | None = None,
+    ) -> None:
         self._unloaded = self._robot = robot
         self._period = period
         self._data = robot.data()
-        self._qp = TorqueQP(robot, period)
+        self._lap = lap or _nobody
+        self._qp = TorqueQP(robot, period, self._lap)
+        self._observer = MomentumObserver(period)
+        self._guard = Guard(safety or SafetyLimits(), robot.tau_max, period)
+        self._compensated = COMPENSATED * robot.tau_max
         self._wrench = ContactWrench(robot, period)
         self._touch = Touch(period)
         self._loop = ForceLoop(period)
@@ -73,12 +105,19 @@ class ArmController:
         self._pressed = False
         self._anchor = 0.0
         self._without_contact = 0.0
+        self._slowed = 1.0
+        self._lacking = np.zeros(7)
+        self._unexplained: np.ndarray | None = None
         self.contact_lost = False
+        self.stopped: Stop | None = None
 
     def follow(self, reference: Reference) -> None:
         """Start following `reference`."""
         self._pending, self._hold_pending = reference, False
         self.contact_lost = False
+        self.stopped = None
+        self._unexplained = None
+        self._guard.reset()
 
     def hold(self) -> None:
         """Stop smoothly and stay, in position mode. Calling it again changes nothing."""
@@ -98,6 +137,7 @@ class ArmController:
     def _use(self, robot: RobotModel, load: pin.Inertia | None) -> None:
         self._robot, self._data = robot, robot.data()
         self._wrench.carry(load)
+        self._observer.change_model()
         self._law_changed = True
 
     def tare(self) -> None:
@@ -113,14 +153,14 @@ class ArmController:
     @property
     def time_in_reference(self) -> float:
         """Seconds along the trajectory; stands still once a reference until contact has touched."""
-        return 0.0 if self._pending is not None else self._course.time
+        return 0.0 if self._pending is not None else self._course.time / self._slowed
 
     @property
     def finished(self) -> bool:
         """Whether the trajectory's time is over and the arm at rest (in position mode: there), or,
-        until contact, the force has been ramped up and settled."""
+        until contact, the force has been ramped up and settled. Never once `stopped`."""
         state = self._state
-        if state is None or self._pending is not None or self._hold_pending:
+        if state is None or self._pending is not None or self._hold_pending or self.stopped is not None:
             return False
         if self._reference is not None and self._reference.until_contact and self._pressed:
             return self._loop.time_since_ramp >= PRESSED_SETTLING
@@ -156,6 +196,21 @@ class ArmController:
         return TrackingError(float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])), joint)
 
     @property
+    def collision(self) -> Collision | None:
+        """The unexpected contact that the arm stopped for, if it did."""
+        return self.stopped if isinstance(self.stopped, Collision) else None
+
+    @property
+    def unmodelled(self) -> np.ndarray:
+        """Torques (7,) in Nm that neither the model nor the wrist sensor explains: friction, wrong masses, contact."""
+        return self._observer.unmodelled
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm with what it is believed to hold."""
+        return self._robot
+
+    @property
     def fallbacks(self) -> int:
         """Ticks on which the QP was not solved."""
         return self._qp.fallbacks
@@ -173,16 +228,21 @@ class ArmController:
         """Torques (7,) in Nm for the next period."""
         state = measure(self._robot, self._data, observation.q, observation.v)
         self._state = state
+        self._lap("model")
         self._wrench.update(state.q, state.v, observation.wrist)
+        self._observer.update(state.M, state.bias, state.v, observation.tau, state.J.T @ self._wrench.credible)
         if self._pending is not None:
             self._begin(self._pending, state)
         elif self._hold_pending:
             self._begin_hold(state)
         self._watch_contact(state)
+        self._watch_safety(state)
         if self._law_changed:
             self._bridge.drop()
-        tasks, wrench = self._law(state)
-        solution = self._qp.solve(state, tasks, self._bridge.advance() - state.J.T @ wrench)
+        self._lap("state")
+        tasks, wrench, limits = self._law(state)
+        feedforward = self._bridge.advance() - state.J.T @ wrench - self._compensation()
+        solution = self._qp.solve(state, tasks, feedforward, limits)
         self._course.advance(self._period)
         tau = solution.tau
         if self._law_changed and self._tau is not None:
@@ -190,12 +250,17 @@ class ArmController:
             tau = self._tau
         self._law_changed = False
         self._tau = tau
+        self._lap("command")
         return tau.copy()
 
     def _begin(self, reference: Reference, state: ArmState) -> None:
         was_regulated = self._pressed and self._reference is not None and self._reference.mode == "hybrid"
         self._reference, self._pending = reference, None
-        self._course = Course.joined(reference.trajectory, state.q, state.v, self._robot.a_max)
+        self._slowed, trajectory = 1.0, reference.trajectory
+        if reference.until_contact:
+            self._slowed = near_contact(self._robot, self._data, reference, APPROACH_SPEED)
+            trajectory = trajectory.slowed(self._slowed)
+        self._course = Course.joined(trajectory, state.q, state.v, self._robot.a_max)
         self._law_changed = True
         self._without_contact = 0.0
         self._pressed = False
@@ -207,6 +272,35 @@ class ArmController:
         self._course = Course.stop(state.q, state.v, self._robot.a_max)
         self._law_changed = True
         self._pressed = False
+
+    def _compensation(self) -> np.ndarray:
+        """Torques (7,) taken for the model's errors. They change slowly enough for an impact, which the observer
+        and the sensor see at slightly different times, to make no step."""
+        wanted = self._observer.unmodelled if self._unexplained is None else self._unexplained
+        wanted = np.minimum(np.maximum(wanted, -self._compensated), self._compensated)
+        most = COMPENSATION_RATE * self._period
+        self._lacking = self._lacking + np.minimum(np.maximum(wanted - self._lacking, -most), most)
+        return self._lacking
+
+    def _stop(self, reason: Stop, state: ArmState) -> None:
+        self.stopped = reason
+        self._begin_hold(state)
+        if isinstance(reason, Collision | ForceTooHigh):
+            # Rest here and give way, bearing only what had to be borne before.
+            self._course = Course(Trajectory.standstill(state.q))
+            self._unexplained = self._observer.unmodelled - self._observer.sudden
+
+    def _watch_safety(self, state: ArmState) -> None:
+        if self.stopped is not None:
+            return
+        guard, reference = self._guard, self._reference
+        reason = guard.speed(state.V) or guard.force(self._wrench.raw[:3]) or guard.sudden(self._observer.sudden)
+        if reason is None and reference is not None and reference.force > 0.0:
+            reason = guard.sensor(self._wrench.is_silent)
+        if reason is None and self._tau is not None:
+            reason = guard.torque(self._tau)
+        if reason is not None:
+            self._stop(reason, state)
 
     def _press(self, reference: Reference, state: ArmState, keep_loop: bool) -> None:
         self._pressed = True
@@ -231,14 +325,17 @@ class ArmController:
             self.contact_lost = True
             self._begin_hold(state)
 
-    def _law(self, state: ArmState) -> tuple[list[Task], np.ndarray]:
-        """The tasks of this instant, and the wrench (6,) on the tool, in W, that they rely on."""
+    def _law(self, state: ArmState) -> tuple[list[Task], np.ndarray, tuple[Row, ...]]:
+        """The tasks of this instant, the wrench (6,) on the tool, in W, that they rely on, and limits of their own."""
         reference = self._reference
         joints = self._course.now()
+        if self._unexplained is not None:
+            return [JointTask(*joints, YIELDING_DAMPING, YIELDING)], _NO_WRENCH, ()
         if reference is None or reference.mode == "position":
-            return [JointTask(*joints)], _NO_WRENCH
+            return [JointTask(*joints)], _NO_WRENCH, ()
+        limits = (ApproachLimit(reference.normal, APPROACH_LIMIT),) if reference.force > 0.0 else ()
         if reference.mode == "hybrid" and not self._pressed:
-            return [JointTask(*joints, damping=GUARDED_DAMPING)], _NO_WRENCH
+            return [JointTask(*joints, GUARDED_DAMPING, GUARDED)], _NO_WRENCH, limits
         target = target_at(self._robot, self._data, *joints)
         posture = PostureTask(*joints)
         normal = reference.normal
@@ -247,11 +344,11 @@ class ArmController:
             wrench = felt.smooth.copy()
             force = self._loop.update(float(normal @ felt.raw[:3]))
             wrench[:3] += normal * (force - normal @ wrench[:3])
-            return [HybridTask(target, reference.R_WC), posture], wrench
+            return [HybridTask(target, reference.R_WC), posture], wrench, limits
         assert reference.stiffness is not None
         if self._pressed:
             target = self._pressed_target(target, reference)
-        return [PoseTask(target, reference.stiffness, self._period), posture], _NO_WRENCH
+        return [PoseTask(target, reference.stiffness, self._period), posture], _NO_WRENCH, limits
 
     def _pressed_target(self, target: Target, reference: Reference) -> Target:
         """The target in the plane through the touched point, below it by force over stiffness."""
@@ -268,3 +365,7 @@ class ArmController:
 
 _UP = np.array([0.0, 0.0, 1.0])
 _NO_WRENCH = np.zeros(6)
+
+
+def _nobody(part: str) -> None:
+    """Takes no times."""

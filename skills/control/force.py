@@ -8,7 +8,7 @@ INTEGRAL_GAIN = 4.0
 RAMP_RATE = 40.0
 """Newtons per second at which the wanted force moves to a new value, on average."""
 
-SHORTEST_RAMP = 0.15
+SHORTEST_RAMP, LONGEST_RAMP = 0.15, 0.35
 """Seconds."""
 
 
@@ -38,7 +38,7 @@ class ForceLoop:
             return
         self._from, self._to = self.wanted, force
         self._time = 0.0
-        self._ramp = max(SHORTEST_RAMP, abs(force - self._from) / RAMP_RATE)
+        self._ramp = min(max(SHORTEST_RAMP, abs(force - self._from) / RAMP_RATE), LONGEST_RAMP)
 
     @property
     def time_since_ramp(self) -> float:

@@ -1,12 +1,14 @@
-"""Limits on torque, position and velocity, as bounds on the joint accelerations.
+"""Limits as parts that can be put together: bounds on the joint accelerations, and rows over them.
 
-Position and velocity bounds are viable in the sense of Del Prete, "Joint position and velocity
-bounds in discrete-time acceleration/torque control of robot arms", 2018: whatever is chosen within
-them, braking with the given deceleration keeps the limits afterwards, so they never contradict
-each other.
+A bound narrows lower ≤ q̈ ≤ upper in place. Position and velocity bounds are viable in the sense of Del
+Prete, "Joint position and velocity bounds in discrete-time acceleration/torque control of robot arms",
+2018: whatever is chosen within them, braking with the given deceleration keeps the limits afterwards. As none
+of them asks for more than that deceleration, they never contradict each other, in whatever order they narrow.
 """
 
 import math
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numba import njit
@@ -14,48 +16,59 @@ from numba import njit
 from skills.control.state import ArmState
 
 FREE = 1e5
-"""Acceleration in rad/s² that stands for no bound."""
+"""Acceleration in rad/s² (or m/s²) that stands for no bound."""
 
 RETURN_RATE = 5.0
 """Speed per distance, 1/s, with which a joint found beyond its limit comes back."""
 
 
-class JointLimits:
-    """Limits q_min, q_max (7,) rad and v_max (7,) rad/s, kept with decelerations of at most `braking` (7,) rad/s²."""
+class Bound(Protocol):
+    """A limit on every joint by itself."""
 
-    def __init__(
-        self, q_min: np.ndarray, q_max: np.ndarray, v_max: np.ndarray, braking: np.ndarray, period: float
-    ) -> None:
-        self._limits = np.stack([q_min, q_max, v_max, braking])
+    def narrow(self, state: ArmState, lower: np.ndarray, upper: np.ndarray) -> None:
+        """Narrow the bounds (7,) on q̈ in place."""
+        ...
+
+
+class Row(Protocol):
+    """A limit on combinations of joint accelerations."""
+
+    def rows(self, state: ArmState, feedforward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """R (k,7) and bounds (k,) each of lower ≤ R q̈ ≤ upper."""
+        ...
+
+
+class AccelerationLimit:
+    """No joint accelerates by more than a_max (7,) rad/s²."""
+
+    def __init__(self, a_max: np.ndarray) -> None:
+        self._a_max = a_max
+
+    def narrow(self, state: ArmState, lower: np.ndarray, upper: np.ndarray) -> None:
+        np.maximum(lower, -self._a_max, out=lower)
+        np.minimum(upper, self._a_max, out=upper)
+
+
+class VelocityLimit:
+    """No joint moves faster than v_max (7,) rad/s, kept with at most `braking` (7,) rad/s²."""
+
+    def __init__(self, v_max: np.ndarray, braking: np.ndarray, period: float) -> None:
+        self._limits = np.stack([v_max, braking])
         self._period = period
 
-    def bounds(self, state: ArmState) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds (7,) on q̈; lower never exceeds upper."""
-        lower, upper = np.empty(7), np.empty(7)
-        _fill_bounds(state.q, state.v, self._limits, self._period, lower, upper)
-        return lower, upper
+    def narrow(self, state: ArmState, lower: np.ndarray, upper: np.ndarray) -> None:
+        _narrow_by_speed(state.v, self._limits, self._period, lower, upper)
 
 
-@njit(cache=True)
-def _highest(room: float, v: float, v_max: float, braking: float, dt: float) -> float:
-    """Highest acceleration towards a limit that is `room` rad ahead, at speed v towards it."""
-    by_speed = (v_max - v) / dt
-    # The speed after this step may still be braked to zero within the room that is then left:
-    # (v + a dt)² = 2 braking (room − v dt − a dt²/2), solved for the larger a.
-    half = v + braking * dt / 2
-    square = half * half - v * v + 2 * braking * (room - v * dt)
-    by_room = (math.sqrt(square) - half) / dt if square > 0.0 else (RETURN_RATE * min(room, 0.0) - v) / dt
-    return min(max(min(by_speed, by_room), -braking), FREE)
+class PositionLimit:
+    """Every joint stays between q_min and q_max (7,) rad, kept with at most `braking` (7,) rad/s²."""
 
+    def __init__(self, q_min: np.ndarray, q_max: np.ndarray, braking: np.ndarray, period: float) -> None:
+        self._limits = np.stack([q_min, q_max, braking])
+        self._period = period
 
-@njit(cache=True)
-def _fill_bounds(
-    q: np.ndarray, v: np.ndarray, limits: np.ndarray, dt: float, lower: np.ndarray, upper: np.ndarray
-) -> None:
-    for i in range(len(q)):
-        q_min, q_max, v_max, braking = limits[0, i], limits[1, i], limits[2, i], limits[3, i]
-        upper[i] = _highest(q_max - q[i], v[i], v_max, braking, dt)
-        lower[i] = min(-_highest(q[i] - q_min, -v[i], v_max, braking, dt), upper[i])
+    def narrow(self, state: ArmState, lower: np.ndarray, upper: np.ndarray) -> None:
+        _narrow_by_room(state.q, state.v, self._limits, self._period, lower, upper)
 
 
 class TorqueLimits:
@@ -70,7 +83,7 @@ class TorqueLimits:
         self._scale = 1.0 / tau_max
 
     def rows(self, state: ArmState, feedforward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """R (7,7) and bounds (7,) each of lower ≤ R q̈ ≤ upper, in shares of each joint's limit."""
+        """The torques M q̈ + h + f, in shares of each joint's limit."""
         still = state.bias + feedforward
         scale = self._scale
         return state.M * scale[:, None], (-self._inside - still) * scale, (self._inside - still) * scale
@@ -82,3 +95,53 @@ class TorqueLimits:
     def clip(self, tau: np.ndarray) -> np.ndarray:
         """Bring tau (7,) within the limits, joint by joint."""
         return np.clip(tau, -self._inside, self._inside)
+
+
+@dataclass(frozen=True, slots=True)
+class ApproachLimit:
+    """The tool comes no faster than `speed` m/s against `normal` (3,), a unit vector in W.
+
+    Kept by nᵀ(J q̈ + J̇ q̇) ≥ −(speed + nᵀ v) / HORIZON: an excess fades, the way a barrier function does it
+    (Ames et al., "Control barrier functions: theory and applications", 2019).
+    """
+
+    normal: np.ndarray
+    speed: float
+
+    def rows(self, state: ArmState, feedforward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        n = self.normal
+        least = -(self.speed + n @ state.V[:3]) / APPROACH_HORIZON - n @ state.drift[:3]
+        return (n @ state.J[:3])[None], np.array([least]), np.full(1, FREE)
+
+
+APPROACH_HORIZON = 0.01
+"""Seconds within which an excess of approach speed shall fade."""
+
+
+@njit(cache=True)
+def _narrow_by_speed(v: np.ndarray, limits: np.ndarray, dt: float, lower: np.ndarray, upper: np.ndarray) -> None:
+    for i in range(len(v)):
+        v_max, braking = limits[0, i], limits[1, i]
+        upper[i] = min(upper[i], max((v_max - v[i]) / dt, -braking))
+        lower[i] = max(lower[i], min((-v_max - v[i]) / dt, braking))
+
+
+@njit(cache=True)
+def _highest(room: float, v: float, braking: float, dt: float) -> float:
+    """Highest acceleration towards a limit that is `room` rad ahead, at speed v towards it."""
+    # The speed after this step may still be braked to zero within the room that is then left:
+    # (v + a dt)² = 2 braking (room − v dt − a dt²/2), solved for the larger a.
+    half = v + braking * dt / 2
+    square = half * half - v * v + 2 * braking * (room - v * dt)
+    highest = (math.sqrt(square) - half) / dt if square > 0.0 else (RETURN_RATE * min(room, 0.0) - v) / dt
+    return max(highest, -braking)
+
+
+@njit(cache=True)
+def _narrow_by_room(
+    q: np.ndarray, v: np.ndarray, limits: np.ndarray, dt: float, lower: np.ndarray, upper: np.ndarray
+) -> None:
+    for i in range(len(q)):
+        q_min, q_max, braking = limits[0, i], limits[1, i], limits[2, i]
+        upper[i] = min(upper[i], _highest(q_max - q[i], v[i], braking, dt))
+        lower[i] = min(max(lower[i], -_highest(q[i] - q_min, -v[i], braking, dt)), upper[i])

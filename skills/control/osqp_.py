@@ -1,8 +1,9 @@
-"""One persistent OSQP workspace for a small dense QP that is solved again and again.
+"""One persistent OSQP workspace for a small dense QP that is solved again and again, where it needs solving.
 
     minimise ½ xᵀ P x + gᵀ x   subject to   lower ≤ x ≤ upper,  row_lower ≤ R x ≤ row_upper
 
-Setting up anew costs fifteen times as much as updating the numbers of a fixed dense pattern.
+Setting up anew costs fifteen times as much as updating the numbers of a fixed dense pattern. Where no limit is
+active the optimum is that of P x = −g, found by Cholesky, and OSQP is left alone.
 """
 
 import math
@@ -61,6 +62,7 @@ class Workspace:
         self._lower = np.empty(size + rows)
         self._upper = np.empty(size + rows)
         self._size = size
+        self._resting: np.ndarray | None = None
         self._no_multipliers = np.zeros(size + rows)
         self._set_up()
 
@@ -94,9 +96,14 @@ class Workspace:
             return x, "primal infeasible"
         if start == _NOT_FINITE:
             return x, "problem not finite"
-        self._solver.load(g, lower, upper, P[self._triangle], R.T.ravel(), self._row_entries)
         if start == _FREE:
-            self._solver.warm_start(x, self._no_multipliers)
+            # Exact, and most ticks are like this: the solver is for those on which a limit matters.
+            self._resting = x.copy()
+            return x, SOLVED
+        self._solver.load(g, lower, upper, P[self._triangle], R.T.ravel(), self._row_entries)
+        if self._resting is not None:
+            self._solver.warm_start(self._resting, self._no_multipliers)
+            self._resting = None
         status = self._solver.run(x)
         if status != SOLVED:
             self._set_up()

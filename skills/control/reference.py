@@ -4,8 +4,10 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+import pinocchio as pin
 
 from planner.motion.trajectory import Trajectory
+from sim.robot import RobotModel
 
 Mode = Literal["position", "impedance", "hybrid"]
 
@@ -59,6 +61,18 @@ class Reference:
     def normal(self) -> np.ndarray:
         """The surface's outward normal (3,) in W."""
         return self.R_WC[:, 2]
+
+
+def near_contact(robot: RobotModel, data: pin.Data, reference: Reference, speed: float) -> float:
+    """How many times longer the reference's trajectory must take (1 or more) for the tool nowhere to come faster
+    than `speed` m/s against the surface. `data` is overwritten."""
+    trajectory, model, tool = reference.trajectory, robot.model, robot.tcp_id
+    fastest = speed
+    for t in np.linspace(0.0, trajectory.duration, 25):
+        q, v, _ = trajectory.at(t)
+        J = pin.computeFrameJacobian(model, data, q, tool, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        fastest = max(fastest, -float(reference.normal @ J[:3] @ v))
+    return fastest / speed
 
 
 class Fade:

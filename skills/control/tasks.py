@@ -17,14 +17,11 @@ import pinocchio as pin
 
 from skills.control.state import ArmState, Target
 
-STIFF = 400.0
+STIFF = 1600.0
 """Position gain in 1/s² of a task that must be followed rather than give way."""
 
-DAMPED = 40.0
+DAMPED = 80.0
 """Velocity gain in 1/s that damps `STIFF` critically."""
-
-JOINT_STIFF, JOINT_DAMPED = 1600.0, 80.0
-"""The same of joint-space tracking: 1/s² and 1/s, critically damped."""
 
 SINK_DAMPING = 20.0
 """Velocity gain in 1/s along a force-controlled direction."""
@@ -56,10 +53,11 @@ class JointTask:
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
-    damping: float = JOINT_DAMPED
+    damping: float = DAMPED
+    stiffness: float = STIFF
 
     def rows(self, state: ArmState) -> Rows:
-        return Rows(_EYE, self.a + self.damping * (self.v - state.v) + JOINT_STIFF * (self.q - state.q))
+        return Rows(_EYE, self.a + self.damping * (self.v - state.v) + self.stiffness * (self.q - state.q))
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.motion.trajectory import Trajectory
-from skills.control.limits import JointLimits
+from skills.control.limits import FREE, AccelerationLimit, PositionLimit, VelocityLimit
 from skills.control.reference import Reference
 from skills.control.state import measure
 from skills.control.tasks import JointTask
@@ -20,9 +20,40 @@ class Moving:
         self.q, self.v = q, v
 
 
+class Together:
+    """Limits that narrow one after the other."""
+
+    def __init__(self, *limits):
+        self._limits = limits
+
+    def bounds(self, state):
+        lower, upper = np.full(7, -FREE), np.full(7, FREE)
+        for limit in self._limits:
+            limit.narrow(state, lower, upper)
+        return lower, upper
+
+
 @pytest.fixture(scope="module")
 def limits(robot):
-    return JointLimits(robot.q_min, robot.q_max, robot.v_max, robot.a_max, PERIOD)
+    return Together(
+        AccelerationLimit(10.0 * robot.a_max),
+        VelocityLimit(robot.v_max, robot.a_max, PERIOD),
+        PositionLimit(robot.q_min, robot.q_max, robot.a_max, PERIOD),
+    )
+
+
+def test_each_limit_bounds_what_it_is_about_and_nothing_else(robot):
+    slow, fast = Moving(np.zeros(7), np.zeros(7)), Moving(np.zeros(7), 0.99 * robot.v_max)
+    lower, upper = Together(AccelerationLimit(robot.a_max)).bounds(fast)
+    np.testing.assert_array_equal(upper, robot.a_max)
+    np.testing.assert_array_equal(lower, -robot.a_max)
+    speed = Together(VelocityLimit(robot.v_max, robot.a_max, PERIOD))
+    np.testing.assert_allclose(speed.bounds(slow)[1], robot.v_max / PERIOD)
+    np.testing.assert_allclose(speed.bounds(fast)[1], 0.01 * robot.v_max / PERIOD)
+    position = Together(PositionLimit(robot.q_min, robot.q_max, robot.a_max, PERIOD))
+    near = Moving(robot.q_max - 1e-3, np.zeros(7))
+    assert np.all(position.bounds(near)[1] < position.bounds(slow)[1])
+    assert np.all(position.bounds(near)[0] < -robot.a_max)
 
 
 @settings(max_examples=100, derandomize=True, deadline=None)

@@ -42,7 +42,7 @@ def test_a_sponge_slides_35_cm_with_10_newtons_on_a_straight_path(lab):
 
 def test_a_touch_that_finds_nothing_ends_without_contact(lab):
     rig = lab.rig(lab.home)
-    lower = lab.straight(lab.home, [0.0, 0.0, -0.03], 0.1)
+    lower = lab.straight(lab.home, [0.0, 0.0, -0.03], 0.03)
     rig.follow(Reference(lower, "hybrid", force=FORCE, until_contact=True))
     assert rig.controller.finished
     assert not rig.controller.contact

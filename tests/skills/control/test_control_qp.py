@@ -4,7 +4,6 @@ import qpsolvers
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skills.control.limits import JointLimits
 from skills.control.osqp_ import Workspace
 from skills.control.state import Target, measure
 from skills.control.tasks import HybridTask, JointTask, PostureTask
@@ -96,7 +95,7 @@ def test_torques_and_accelerations_keep_their_limits_whatever_is_asked(robot, se
     ][seed % 2]
     qp = TorqueQP(robot, PERIOD)
     solution = qp.solve(state, tasks, state.J.T @ (10.0 * rng.normal(size=6)))
-    lower, upper = JointLimits(robot.q_min, robot.q_max, robot.v_max, robot.a_max, PERIOD).bounds(state)
+    lower, upper = qp.joint_bounds(state)
     assert np.all(np.abs(solution.tau) <= robot.tau_max)
     assert solution.is_fallback or np.all((solution.a >= lower - 1e-2) & (solution.a <= upper + 1e-2))
     assert qp.torque_limit_violations == 0
@@ -155,7 +154,7 @@ def test_every_status_but_solved_fades_into_braking_within_the_limits(robot, sta
     assert all(s.is_fallback and np.all(np.abs(s.tau) <= robot.tau_max) for s in solutions)
     assert qp.fallbacks == 60
     assert np.linalg.norm(solutions[0].a - before.a) < np.linalg.norm(solutions[-1].a - before.a)
-    lower, upper = JointLimits(robot.q_min, robot.q_max, robot.v_max, robot.a_max, PERIOD).bounds(state)
+    lower, upper = qp.joint_bounds(state)
     np.testing.assert_allclose(solutions[-1].a, np.clip(-FALLBACK_DAMPING * state.v, lower, upper), atol=1e-3)
 
 

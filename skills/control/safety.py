@@ -1,0 +1,139 @@
+"""When the arm must stop: safety limits, and the typed reasons for which it did.
+
+A limit in the QP (`limits`) shapes the motion so that it is kept; one of these ends the motion when it
+is about to be passed, whatever the task.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+ALERT = 0.9
+"""Share of a safety limit at which the arm stops, so that the limit itself is not passed."""
+
+TORQUE_ALERT = 0.98
+"""The same of a joint's torque: the QP keeps it within its limit anyway."""
+
+TORQUE_PATIENCE = 0.05
+"""Seconds that a joint may work at its torque limit."""
+
+FORCE_PATIENCE = 0.004
+COLLISION_PATIENCE = 0.006
+"""Seconds that an excess must last: one odd reading stops nothing."""
+
+SENSOR_PATIENCE = 0.02
+"""Seconds without a wrist reading after which force control is blind."""
+
+
+@dataclass(frozen=True)
+class ForceTooHigh:
+    """The contact force came near its limit, N."""
+
+    force: float
+    limit: float
+
+    def __str__(self) -> str:
+        return f"{self.force:.0f} N of contact force, and {self.limit:.0f} N is the safety limit"
+
+
+@dataclass(frozen=True)
+class TooFast:
+    """The tool's speed came near its limit, m/s."""
+
+    speed: float
+    limit: float
+
+    def __str__(self) -> str:
+        return f"the hand moved at {self.speed:.2f} m/s, and {self.limit:.2f} m/s is the safety limit"
+
+
+@dataclass(frozen=True)
+class TorqueSpent:
+    """A joint (1 to 7) went on needing all the torque it has, Nm."""
+
+    joint: int
+    torque: float
+
+    def __str__(self) -> str:
+        return f"joint {self.joint} needs more than {self.torque:.0f} Nm"
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Something that no model explains pushed against the arm: most on a joint (1 to 7), about so many Nm."""
+
+    joint: int
+    torque: float
+
+    def __str__(self) -> str:
+        return f"something unexpected pushes joint {self.joint} with about {self.torque:.0f} Nm"
+
+
+@dataclass(frozen=True)
+class SensorLost:
+    """The wrist sensor was silent for so many seconds while a force was to be kept."""
+
+    silent: float
+
+    def __str__(self) -> str:
+        return f"the wrist sensor has been silent for {self.silent * 1000:.0f} ms"
+
+
+Stop = ForceTooHigh | TooFast | TorqueSpent | Collision | SensorLost
+
+
+@dataclass(frozen=True)
+class SafetyLimits:
+    """contact_force: N, of the wrench at the wrist that weight doesn't explain. speed: m/s of the tool centre.
+    collision (7,): Nm on each joint that come up suddenly and neither model nor wrist sensor explains; above
+    what friction and wrong masses make of any motion."""
+
+    contact_force: float = 120.0
+    speed: float = 2.5
+    collision: np.ndarray = field(default_factory=lambda: np.array([16.0, 16.0, 10.0, 10.0, 6.0, 5.0, 3.0]))
+
+
+class Guard:
+    """Watches one tick after the other and says why to stop."""
+
+    def __init__(self, limits: SafetyLimits, tau_max: np.ndarray, period: float) -> None:
+        self._limits, self._tau_max = limits, tau_max
+        self._period = period
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew: no excess has lasted yet."""
+        self._forced = self._spent = self._struck = self._silent = 0.0
+
+    def force(self, force: np.ndarray) -> Stop | None:
+        """Look at the contact force (3,) in N."""
+        size = float(np.sqrt(force @ force))
+        self._forced = self._longer(self._forced, size > ALERT * self._limits.contact_force)
+        return ForceTooHigh(size, self._limits.contact_force) if self._forced > FORCE_PATIENCE else None
+
+    def speed(self, V: np.ndarray) -> Stop | None:
+        """Look at the tool's velocity (6,)."""
+        speed = float(np.sqrt(V[:3] @ V[:3]))
+        return TooFast(speed, self._limits.speed) if speed > ALERT * self._limits.speed else None
+
+    def sudden(self, torque: np.ndarray) -> Stop | None:
+        """Look at torques (7,) in Nm that nothing explains."""
+        share = np.abs(torque) / self._limits.collision
+        worst = int(share.argmax())
+        self._struck = self._longer(self._struck, bool(share[worst] > 1.0))
+        return Collision(worst + 1, float(abs(torque[worst]))) if self._struck > COLLISION_PATIENCE else None
+
+    def torque(self, tau: np.ndarray) -> Stop | None:
+        """Look at torques (7,) in Nm that are commanded."""
+        share = np.abs(tau) / self._tau_max
+        worst = int(share.argmax())
+        self._spent = self._longer(self._spent, bool(share[worst] > TORQUE_ALERT))
+        return TorqueSpent(worst + 1, float(self._tau_max[worst])) if self._spent > TORQUE_PATIENCE else None
+
+    def sensor(self, is_silent: bool) -> Stop | None:
+        """Look at whether the wrist sensor says anything, while a force is to be kept."""
+        self._silent = self._longer(self._silent, is_silent)
+        return SensorLost(self._silent) if self._silent > SENSOR_PATIENCE else None
+
+    def _longer(self, so_far: float, is_so: bool) -> float:
+        return so_far + self._period if is_so else 0.0
