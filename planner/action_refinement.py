@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.failure import RefinementFailure
-from planner.refinement import Budget, Refinement, Refiners, Work
+from planner.failure import Blocked, RefinementFailure
+from planner.refinement import Budget, Hints, Refinement, Refiners, Work
 from planner.task.learned import Learned
 from planner.task.situation import Situation, Spot
 from planner.task.symbols import GroundAction
@@ -54,14 +54,21 @@ class ActionRefiner:
         hints = replace(learned, first=tuple(sample for sample in wanted if sample not in avoided), avoid=avoided)
         tries = len(hints.first) + (budget.tries if is_fresh else 0)
         work.add("refinements")
-        outcome = self._refiners[action.name].refine(
-            action, situation.scene, rng, replace(budget, tries=max(1, tries)), hints
-        )
+        outcome = self._outcome(action, situation.scene, rng, replace(budget, tries=max(1, tries)), hints)
         if isinstance(outcome, Refinement):
             self._refined[key] = outcome
             earlier = (sample for sample in self._worked.get(place, ()) if sample != outcome.sample)
             self._worked[place] = (outcome.sample, *earlier)
         return outcome, hints.first
+
+    def _outcome(
+        self, action: GroundAction, scene: SceneState, rng: np.random.Generator, budget: Budget, hints: Hints
+    ) -> Refinement | RefinementFailure:
+        try:
+            return self._refiners[action.name].refine(action, scene, rng, budget, hints)
+        except Exception as error:  # Whatever goes wrong in a planner, the arm is in the middle of something.
+            reason = f"working it out failed ({type(error).__name__}: {error})"
+            return RefinementFailure(action, reason, (Blocked(None, reason),))
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
         """The scene after the refined action went as meant."""

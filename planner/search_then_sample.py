@@ -25,7 +25,7 @@ from planner.task.planner import TaskPlanner
 from planner.task.primitives import arities, with_away
 from planner.task.sexpr import PddlError
 from planner.task.situation import Situation
-from planner.task.symbols import Fact, GroundAction, NoTaskPlan, Step, TaskPlan
+from planner.task.symbols import Fact, GroundAction, NoTaskPlan, Step, TaskPlan, flaw
 from scenarios.names import known
 from sim.scene import SceneState
 
@@ -189,13 +189,24 @@ class SearchThenSample:
         stated = Problem(f"round-{number}", self._domain.name, objects, self._facts(scene, learned), goal)
         domain, problem = with_constraints(self._domain, stated, learned.constraints())
         texts = write_domain(domain), write_problem(problem)
-        found = self._task_planner.solve(*texts, self._settings.max_expansions)
+        found = self._solved(*texts, problem)
         work.add("expansions", found.expansions)
         plan = [str(action) for action in found.actions] if isinstance(found, TaskPlan) else None
         event = {"round": number, "domain": texts[0], "problem": texts[1], "plan": plan}
         kind = "round" if learned is self.learned else "proof_sought"
         self._report(kind, {**event, "expansions": found.expansions})
         return problem, found
+
+    def _solved(self, domain: str, problem: str, stated: Problem) -> TaskPlan | NoTaskPlan:
+        """What the task planner says, its own failure or a plan that doesn't work taken for finding none."""
+        try:
+            found = self._task_planner.solve(domain, problem, self._settings.max_expansions)
+        except PddlError:
+            raise
+        except Exception as error:  # Whatever goes wrong in a planner, the arm is in the middle of something.
+            return NoTaskPlan(False, 0, f"{type(error).__name__}: {error}")
+        wrong = flaw(found, stated.init, stated.goal) if isinstance(found, TaskPlan) else None
+        return found if wrong is None else NoTaskPlan(False, found.expansions, f"its plan does not work: {wrong}")
 
     def _learn_from(self, stuck: Stuck, rest: tuple[Step, ...], rng: np.random.Generator, work: Work) -> None:
         """Learn from the failure that ended a round, and look what else of the kind stands in the way.
@@ -249,6 +260,8 @@ class SearchThenSample:
         return name in scene.poses and not is_held and place_of(scene, name) is None
 
     def _exhausted(self, found: TaskPlan | NoTaskPlan, number: int) -> NoPlan:
+        if isinstance(found, NoTaskPlan) and found.failure:
+            return self._no_plan(f"the task planner failed ({found.failure})", number)
         if isinstance(found, NoTaskPlan) and not found.exhausted:
             return self._no_plan(f"no task plan within {self._settings.max_expansions} expansions", number)
         return self._no_plan("no plan found", number)

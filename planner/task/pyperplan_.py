@@ -14,7 +14,7 @@ from typing import Any
 from planner.task.pddl import Domain, Problem
 from planner.task.pddl_reader import read_domain, read_problem
 from planner.task.primitives import ground
-from planner.task.symbols import Fact, NoTaskPlan, Step, TaskPlan
+from planner.task.symbols import NoTaskPlan, TaskPlan, flaw
 
 SMALL = 40
 """Ground operators up to which A* with h^max is tried first by `auto`."""
@@ -155,18 +155,11 @@ def _search(library: SimpleNamespace, name: str) -> tuple[Callable[..., Any], Ca
 
 
 def _checked(domain: Domain, problem: Problem, names: list[str], expansions: int) -> TaskPlan:
-    """The plan as steps, each applied in turn: it must reach the goal, else the search went wrong."""
+    """The plan as steps: it must lead to the goal, else the search went wrong."""
     schemas = {schema.name: schema for schema in domain.actions}
-    steps: list[Step] = []
-    facts: frozenset[Fact] = problem.init
-    for name in names:
-        title, *args = name.strip("()").split()
-        step = ground(schemas[title], tuple(args))
-        if not step.applicable(facts):
-            missing = ", ".join(map(str, sorted(step.preconditions - facts)))
-            raise RuntimeError(f"Pyperplan's plan breaks at {name}: {missing} doesn't hold")
-        facts = step.apply(facts)
-        steps.append(step)
-    if not problem.goal <= facts:
-        raise RuntimeError(f"Pyperplan's plan misses the goal: {', '.join(map(str, sorted(problem.goal - facts)))}")
-    return TaskPlan(tuple(steps), problem.goal, expansions)
+    calls = [name.strip("()").split() for name in names]
+    plan = TaskPlan(tuple(ground(schemas[title], tuple(args)) for title, *args in calls), problem.goal, expansions)
+    wrong = flaw(plan, problem.init, problem.goal)
+    if wrong is not None:
+        raise RuntimeError(f"Pyperplan's plan does not work: {wrong}")
+    return plan

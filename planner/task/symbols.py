@@ -66,10 +66,24 @@ class TaskPlan:
 
 @dataclass(frozen=True)
 class NoTaskPlan:
-    """The task planner found nothing. `exhausted`: the search space was searched whole, so none exists."""
+    """The task planner found nothing. `exhausted`: the search space was searched whole, so none exists.
+
+    `failure`: what went wrong in the planner itself, "" if nothing did.
+    """
 
     exhausted: bool
     expansions: int
+    failure: str = ""
+
+
+def flaw(plan: TaskPlan, facts: frozenset[Fact], goal: frozenset[Fact]) -> str | None:
+    """What is wrong with a plan from these facts to the goal; None if every step applies in turn and the goal holds."""
+    for number, step in enumerate(plan.steps, start=1):
+        if not step.applicable(facts):
+            missing = ", ".join(map(str, sorted(step.preconditions - facts)))
+            return f"step {number}, {step.action}, needs {missing}"
+        facts = step.apply(facts)
+    return None if goal <= facts else f"it misses {', '.join(map(str, sorted(goal - facts)))}"
 
 
 def resume_at(plan: TaskPlan, facts: frozenset[Fact], first: int = 0) -> int | None:

@@ -1,0 +1,81 @@
+"""Planners that crash or talk nonsense, wired in where the real ones are: failures, never a dying run."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import skills
+from planner.refinement import Work
+from planner.search_then_sample import NoPlan, PlanSettings, SearchThenSample, Solution
+from planner.task.facts import goal_facts
+from planner.task.pddl_reader import read_domain, read_text
+from planner.task.pyperplan_ import PyperplanPlanner
+from planner.task.symbols import TaskPlan
+
+DOMAIN = read_domain(read_text(Path(skills.__file__).parent / "domain.pddl"))
+GOAL = goal_facts("(in_bin cup right_bin)")
+
+
+class Faulty:
+    """Pyperplan, of whose first answers so many are spoiled."""
+
+    def __init__(self, spoil, times):
+        self.real, self.spoil, self.left = PyperplanPlanner(), spoil, times
+
+    def solve(self, domain_text, problem_text, max_expansions):
+        found = self.real.solve(domain_text, problem_text, max_expansions)
+        if self.left == 0:
+            return found
+        self.left -= 1
+        return self.spoil(found)
+
+
+def crash(_):
+    raise MemoryError("out of memory on purpose")
+
+
+def without_its_first_step(found):
+    return replace(found, steps=found.steps[1:]) if isinstance(found, TaskPlan) else found
+
+
+def planned(task_planner, skill, scene):
+    loop = SearchThenSample(
+        task_planner,
+        dict.fromkeys(("pick", "place", "wipe", *(a.name.split("--")[0] for a in DOMAIN.actions)), skill),
+        DOMAIN,
+        PlanSettings(tries=5),
+        lambda kind, data: None,
+    )
+    return loop.plan(scene, GOAL, np.random.default_rng(0), Work())
+
+
+@pytest.mark.parametrize("spoil", [crash, without_its_first_step])
+def test_a_task_planner_that_fails_once_is_asked_again(spoil, tabletop, stand_in):
+    outcome = planned(Faulty(spoil, 1), stand_in(lambda *_: None), tabletop("cup"))
+    assert isinstance(outcome, Solution)
+    assert [str(action) for action in outcome.plan.actions] == ["pick(cup, table)", "place(cup, right_bin)"]
+
+
+def test_a_task_planner_that_always_crashes_leads_to_no_plan_that_says_so(tabletop, stand_in):
+    outcome = planned(Faulty(crash, -1), stand_in(lambda *_: None), tabletop("cup"))
+    assert isinstance(outcome, NoPlan)
+    assert outcome.verdict == "budget"
+    assert "the task planner failed (MemoryError: out of memory on purpose)" in outcome.reason
+
+
+def test_a_plan_that_does_not_work_is_not_taken(tabletop, stand_in):
+    outcome = planned(Faulty(without_its_first_step, -1), stand_in(lambda *_: None), tabletop("cup"))
+    assert isinstance(outcome, NoPlan)
+    assert "its plan does not work: step 1, place(cup, right_bin), needs holding(cup)" in outcome.reason
+
+
+def test_a_refiner_that_crashes_fails_its_action_and_no_more(tabletop, stand_in):
+    def broken(action, *_):
+        if action.args[-1] == "right_bin":
+            raise ZeroDivisionError("on purpose")
+
+    outcome = planned(PyperplanPlanner(), stand_in(broken), tabletop("cup"))
+    assert isinstance(outcome, NoPlan)
+    assert "working it out failed (ZeroDivisionError: on purpose)" in outcome.reason
