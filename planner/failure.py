@@ -76,6 +76,10 @@ class GraspSlipped(ExecutionFailure):
     """The held object left the hand or moved in it."""
 
 
+class DragSlipped(ExecutionFailure):
+    """What is dragged lagged behind the hand, however hard it was pressed."""
+
+
 class ContactLost(ExecutionFailure):
     """Contact that the motion needs was lost, or never found."""
 
@@ -94,3 +98,7 @@ class EffectMissing(ExecutionFailure):
 
 class ForceExceeded(ExecutionFailure):
     """A contact force passed its limit."""
+
+
+class ArmStopped(ExecutionFailure):
+    """The controller stopped the arm for safety: a limit was about to be passed, or something unexpected pushed it."""

@@ -10,7 +10,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Sequence
 
-from planner.failure import ContactLost, ExecutionFailure, ForceExceeded, GraspMissed, PathBlocked
+from planner.failure import ArmStopped, ContactLost, ExecutionFailure, ForceExceeded, GraspMissed, PathBlocked
 from planner.refinement import Phase
 from skills.context import ActionRun, SkillContext
 from skills.control.reference import Reference
@@ -65,6 +65,14 @@ class PhaseLeaf(Behaviour):
     def begin(self) -> None:
         """Set what is followed from now on."""
 
+    @abstractmethod
+    def watch(self) -> Status:
+        """How it goes, at every tick."""
+
+    def update(self) -> Status:
+        stop = self._context.controller.stopped
+        return self.watch() if stop is None else self.refuse(ArmStopped, str(stop))
+
     def terminate(self, new_status: Status) -> None:
         if new_status == Status.INVALID:
             self._context.controller.hold()
@@ -96,7 +104,7 @@ class Follow(PhaseLeaf):
             self._context.grip.open_to(phase.opening)
         self._context.controller.follow(Reference(phase.trajectory, "position"))
 
-    def update(self) -> Status:
+    def watch(self) -> Status:
         controller = self._context.controller
         if controller.finished:
             return Status.SUCCESS
@@ -115,7 +123,7 @@ class Open(PhaseLeaf):
         self._context.controller.hold()
         self._context.grip.open_to(self.phase.opening)
 
-    def update(self) -> Status:
+    def watch(self) -> Status:
         observation = self._context.observation
         if abs(observation.opening - self.phase.opening) < 0.003:
             self._context.controller.clear_payload()
@@ -133,7 +141,7 @@ class Close(PhaseLeaf):
         self._context.grip.close(self.phase.grip)
         self._still_since: float | None = None
 
-    def update(self) -> Status:
+    def watch(self) -> Status:
         context = self._context
         observation = context.observation
         if abs(observation.opening_velocity) > STILL or self.elapsed < SETTLE:
@@ -159,7 +167,7 @@ class Touch(PhaseLeaf):
             context.grip.open_to(phase.opening)
         context.controller.follow(pressing(phase, context, until_contact=True))
 
-    def update(self) -> Status:
+    def watch(self) -> Status:
         controller = self._context.controller
         if self.too_forceful():
             return self.refuse(ForceExceeded, f"{controller.contact_force:.0f} N at touchdown")
@@ -180,7 +188,7 @@ class Slide(PhaseLeaf):
     def begin(self) -> None:
         self._context.controller.follow(pressing(self.phase, self._context))
 
-    def update(self) -> Status:
+    def watch(self) -> Status:
         controller = self._context.controller
         if self.too_forceful():
             return self.refuse(ForceExceeded, f"{controller.contact_force:.0f} N while sliding")
