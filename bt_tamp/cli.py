@@ -25,6 +25,7 @@ COMMANDS = {
     "explain": "tell the story of a run",
     "render": "render the video of a run",
     "sweep": "run scenes over many seeds in parallel, and sum up",
+    "bench": "measure how well contact is controlled, and what control costs",
 }
 
 EPILOG = """\

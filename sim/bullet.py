@@ -5,7 +5,7 @@ couples the two fingers, as the gear does in the real gripper. Two frictions com
 """
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,10 +64,14 @@ def resolved_urdf(robot: RobotModel) -> Iterator[str]:
 
 
 class BulletPlant:
-    """A `Plant` for a scenario. Every quantity in SI units and in W unless said otherwise."""
+    """A `Plant` for a scenario. Every quantity in SI units and in W unless said otherwise.
+
+    `lap` is called with the name of each part of a step that has just been done.
+    """
 
     def __init__(self, scenario: Scenario, robot: RobotModel, window: bool = False) -> None:
         self.scenario = scenario
+        self.lap: Callable[[str], None] = _nobody
         self.timestep = PHYSICS_STEP
         self._t = 0.0
         self._client = p.connect(p.GUI if window else p.DIRECT)
@@ -139,7 +143,9 @@ class BulletPlant:
             forces=[*self._tau, gear, -gear],
             physicsClientId=self._client,
         )
+        self.lap("drive")
         p.stepSimulation(physicsClientId=self._client)
+        self.lap("physics")
         self._t += PHYSICS_STEP
 
     def contacts(self) -> list[Contact]:
@@ -351,3 +357,7 @@ class BulletPlant:
             p.resetJointState(self._robot, finger, robot.gripper.stroke / 2, physicsClientId=self._client)
         p.enableJointForceTorqueSensor(self._robot, self._sensor_joint, True, physicsClientId=self._client)
         self.apply(Command(np.zeros(7), GripCommand(0.0, robot.gripper.max_force)))
+
+
+def _nobody(part: str) -> None:
+    """Takes no times."""

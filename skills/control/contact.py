@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 import pinocchio as pin
+from numba import njit
 
 from sim.robot import GRAVITY, RobotModel
 from sim.wrench import Wrench
 from skills.control.force import smooth_step
+from skills.control.state import ArmState
 
 SMOOTHING = 0.02
 """Time constant in seconds of the smoothed wrench."""
@@ -21,8 +23,6 @@ TARE_NOISE = 1.0
 SENSOR_ERROR = (1.0, 0.3)
 """N and Nm that an untared sensor may be off by."""
 
-_GRAVITY = np.array([0.0, 0.0, -GRAVITY])
-
 
 class ContactWrench:
     """Wrench that the world exerts on the tool, at G in W axes (6,): `raw`, and `smooth` (low-passed).
@@ -33,12 +33,11 @@ class ContactWrench:
     """
 
     def __init__(self, robot: RobotModel, period: float) -> None:
-        self._robot = robot
-        self._data = robot.data()
         self._hand = hand_inertia(robot)
-        self._beyond_sensor = self._hand
+        self._R_GE, self._p_GE = robot.X_EG.inverse().rotation, robot.X_EG.inverse().translation
         self._period = period
         self._last_v: np.ndarray | None = None
+        self.carry(None)
         self._blend = 1.0 - np.exp(-period / SMOOTHING)
         self._bias_G = np.zeros(6)
         self._smooth_G = np.zeros(6)
@@ -49,7 +48,8 @@ class ContactWrench:
 
     def carry(self, load: pin.Inertia | None) -> None:
         """The hand holds `load` (in G) from now on, or nothing."""
-        self._beyond_sensor = self._hand if load is None else self._hand + load
+        body = self._hand if load is None else self._hand + load
+        self._body = (body.mass, body.lever.copy(), body.inertia.copy(), self._R_GE, self._p_GE)
 
     def tare(self) -> None:
         """Take what is felt now for the sensor's and the model's error, at once; and what is still felt on average
@@ -58,31 +58,24 @@ class ContactWrench:
         self._smooth_G = np.zeros(6)
         self._taring = _Mean(round(TARING / self._period))
 
-    def update(self, q: np.ndarray, v: np.ndarray, wrist: Wrench) -> None:
-        """Read the sensor at configuration q and velocity v (7,), once every period. The first reading
-        only prepares for the second. A reading that is not finite is left out: `is_silent`, and the last one stays."""
-        last, self._last_v = self._last_v, v
+    def update(self, state: ArmState, wrist: Wrench) -> None:
+        """Read the sensor, once every period, the arm being in `state`. The first reading only prepares for the
+        second. A reading that is not finite is left out: `is_silent`, and the last one stays."""
+        last, self._last_v = self._last_v, state.v
         if last is None:
             return
         self.is_silent = not math.isfinite(wrist.force.sum() + wrist.torque.sum())
         if self.is_silent:
             return
-        a = (v - last) / self._period
-        robot, data = self._robot, self._data
-        pin.forwardKinematics(robot.model, data, q, v, a)
-        rotation = pin.updateFramePlacement(robot.model, data, robot.tcp_id).rotation
-        twist = pin.getFrameVelocity(robot.model, data, robot.tcp_id, pin.ReferenceFrame.LOCAL)
-        acceleration = pin.getFrameAcceleration(robot.model, data, robot.tcp_id, pin.ReferenceFrame.LOCAL)
-        acceleration.linear = acceleration.linear - rotation.T @ _GRAVITY
-        body = self._beyond_sensor
-        momentum_rate = body * acceleration + twist.cross(body * twist)
-        felt = robot.X_EG.actInv(pin.Force(wrist.vector))
-        contact = (felt + momentum_rate).vector - self._bias_G
+        contact = np.empty(6)
+        a = (state.v - last) / self._period
+        _contact_wrench(state.J, a, state.drift, state.V, state.R, *self._body, wrist.force, wrist.torque, contact)
+        contact -= self._bias_G
         if self._taring is not None:
             contact = self._go_on_taring(self._taring, contact)
         self._smooth_G = self._smooth_G + self._blend * (contact - self._smooth_G)
-        self.raw = _in_axes(rotation, contact)
-        self.smooth = _in_axes(rotation, self._smooth_G)
+        self.raw = _in_axes(state.R, contact)
+        self.smooth = _in_axes(state.R, self._smooth_G)
 
     @property
     def credible(self) -> np.ndarray:
@@ -162,3 +155,33 @@ def hand_inertia(robot: RobotModel) -> pin.Inertia:
 
 def _in_axes(rotation: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     return (wrench.reshape(2, 3) @ rotation.T).ravel()
+
+
+@njit(cache=True)
+def _contact_wrench(J, a, drift, V, R, mass, lever, inertia, R_GE, p_GE, force, torque, contact):
+    """What acts on the tool from outside (6,), about G in its axes: what the sensor feels (force, torque in E) less
+    weight and inertia of the body beyond it, by Newton and Euler."""
+    lift, swing, spin = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        # Accelerations of G, in G's axes; gravity counts as an acceleration upwards.
+        lift[i] = swing[i] = spin[i] = 0.0
+        for k in range(3):
+            linear, angular = drift[k], drift[3 + k]
+            for j in range(7):
+                linear += J[k, j] * a[j]
+                angular += J[3 + k, j] * a[j]
+            if k == 2:
+                linear += GRAVITY
+            lift[i] += R[k, i] * linear
+            swing[i] += R[k, i] * angular
+            spin[i] += R[k, i] * V[3 + k]
+    centre = lift + _cross(swing, lever) + _cross(spin, _cross(spin, lever))
+    turning = inertia @ swing + _cross(spin, inertia @ spin)
+    felt = R_GE @ force
+    contact[:3] = felt + mass * centre
+    contact[3:] = R_GE @ torque + _cross(p_GE, felt) + turning + mass * _cross(lever, centre)
+
+
+@njit(cache=True)
+def _cross(a, b):
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -19,7 +19,7 @@ from skills.control.reference import Course, Reference, near_contact
 from skills.control.safety import Collision, ForceTooHigh, Guard, SafetyLimits, Stop
 from skills.control.state import ArmState, Target, measure, target_at
 from skills.control.tasks import HybridTask, JointTask, PoseTask, PostureTask, Task, pose_error
-from skills.control.torque_qp import TorqueQP
+from skills.control.torque_qp import TorqueQP, nobody
 
 LOST_AFTER = 0.014
 """Seconds without contact, on top of its debouncing, after which a pressed reference has lost it."""
@@ -73,7 +73,7 @@ class ArmController:
     What it follows is set by `follow` and `hold`, which take effect at the next `update`. It holds
     at first. Losing contact while pressed, it holds and says so in `contact_lost`. When a safety limit is about
     to be passed or something unexpected pushes, it comes to rest, holds and says why in `stopped`, until it is
-    told what to follow next. `lap` is told which part of an update has just been done, for who measures.
+    told what to follow next. `lap` is called with the name of each part of an update that has just been done.
     """
 
     def __init__(
@@ -81,13 +81,12 @@ class ArmController:
         robot: RobotModel,
         period: float = 0.002,
         safety: SafetyLimits | None = None,
-        lap: Callable[[str], None] | None = None,
     ) -> None:
         self._unloaded = self._robot = robot
         self._period = period
         self._data = robot.data()
-        self._lap = lap or _nobody
-        self._qp = TorqueQP(robot, period, self._lap)
+        self.lap: Callable[[str], None] = nobody
+        self._qp = TorqueQP(robot, period, lambda part: self.lap(part))
         self._observer = MomentumObserver(period)
         self._guard = Guard(safety or SafetyLimits(), robot.tau_max, period)
         self._compensated = COMPENSATED * robot.tau_max
@@ -228,8 +227,8 @@ class ArmController:
         """Torques (7,) in Nm for the next period."""
         state = measure(self._robot, self._data, observation.q, observation.v)
         self._state = state
-        self._lap("model")
-        self._wrench.update(state.q, state.v, observation.wrist)
+        self.lap("model")
+        self._wrench.update(state, observation.wrist)
         self._observer.update(state.M, state.bias, state.v, observation.tau, state.J.T @ self._wrench.credible)
         if self._pending is not None:
             self._begin(self._pending, state)
@@ -239,7 +238,7 @@ class ArmController:
         self._watch_safety(state)
         if self._law_changed:
             self._bridge.drop()
-        self._lap("state")
+        self.lap("state")
         tasks, wrench, limits = self._law(state)
         feedforward = self._bridge.advance() - state.J.T @ wrench - self._compensation()
         solution = self._qp.solve(state, tasks, feedforward, limits)
@@ -250,7 +249,7 @@ class ArmController:
             tau = self._tau
         self._law_changed = False
         self._tau = tau
-        self._lap("command")
+        self.lap("command")
         return tau.copy()
 
     def _begin(self, reference: Reference, state: ArmState) -> None:
@@ -365,7 +364,3 @@ class ArmController:
 
 _UP = np.array([0.0, 0.0, 1.0])
 _NO_WRENCH = np.zeros(6)
-
-
-def _nobody(part: str) -> None:
-    """Takes no times."""

@@ -45,8 +45,7 @@ class AccelerationLimit:
         self._a_max = a_max
 
     def narrow(self, state: ArmState, lower: np.ndarray, upper: np.ndarray) -> None:
-        np.maximum(lower, -self._a_max, out=lower)
-        np.minimum(upper, self._a_max, out=upper)
+        _narrow(self._a_max, lower, upper)
 
 
 class VelocityLimit:
@@ -84,9 +83,9 @@ class TorqueLimits:
 
     def rows(self, state: ArmState, feedforward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The torques M q̈ + h + f, in shares of each joint's limit."""
-        still = state.bias + feedforward
-        scale = self._scale
-        return state.M * scale[:, None], (-self._inside - still) * scale, (self._inside - still) * scale
+        R, lower, upper = np.empty((7, 7)), np.empty(7), np.empty(7)
+        _torque_rows(state.M, state.bias, feedforward, self._inside, self._scale, R, lower, upper)
+        return R, lower, upper
 
     def broken(self, tau: np.ndarray) -> bool:
         """Whether any torque of tau (7,) lies beyond its limit."""
@@ -109,13 +108,52 @@ class ApproachLimit:
     speed: float
 
     def rows(self, state: ArmState, feedforward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        n = self.normal
-        least = -(self.speed + n @ state.V[:3]) / APPROACH_HORIZON - n @ state.drift[:3]
-        return (n @ state.J[:3])[None], np.array([least]), np.full(1, FREE)
+        R, least = np.empty((1, 7)), np.empty(1)
+        _approach_row(self.normal, self.speed, state.V, state.J, state.drift, R, least)
+        return R, least, _UNBOUNDED
 
 
 APPROACH_HORIZON = 0.01
 """Seconds within which an excess of approach speed shall fade."""
+
+
+_UNBOUNDED = np.full(1, FREE)
+
+
+@njit(cache=True)
+def _narrow(a_max: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
+    for i in range(len(a_max)):
+        lower[i] = max(lower[i], -a_max[i])
+        upper[i] = min(upper[i], a_max[i])
+
+
+@njit(cache=True)
+def _torque_rows(
+    M: np.ndarray,
+    bias: np.ndarray,
+    feedforward: np.ndarray,
+    inside: np.ndarray,
+    scale: np.ndarray,
+    R: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> None:
+    for i in range(len(bias)):
+        still = bias[i] + feedforward[i]
+        lower[i], upper[i] = (-inside[i] - still) * scale[i], (inside[i] - still) * scale[i]
+        for j in range(len(bias)):
+            R[i, j] = M[i, j] * scale[i]
+
+
+@njit(cache=True)
+def _approach_row(
+    n: np.ndarray, speed: float, V: np.ndarray, J: np.ndarray, drift: np.ndarray, R: np.ndarray, least: np.ndarray
+) -> None:
+    v = n[0] * V[0] + n[1] * V[1] + n[2] * V[2]
+    a = n[0] * drift[0] + n[1] * drift[1] + n[2] * drift[2]
+    least[0] = -(speed + v) / APPROACH_HORIZON - a
+    for j in range(7):
+        R[0, j] = n[0] * J[0, j] + n[1] * J[1, j] + n[2] * J[2, j]
 
 
 @njit(cache=True)

@@ -7,6 +7,7 @@ C(q, q̇)ᵀ q̇ − g written as Ṁ q̇ − h (M − 2C is skew). It needs no 
 """
 
 import numpy as np
+from numba import njit
 
 GAIN = 60.0
 """K in 1/s: torques from outside are seen with a time constant of 17 ms."""
@@ -48,12 +49,23 @@ class MomentumObserver:
         last, self._last = self._last, (M, v)
         if last is None:
             return
-        M_before, v_before = last
+        self.unmodelled, self.sudden = np.empty(7), np.empty(7)
+        rates = (self._period, self._blend, self._creep)
+        state = (self._all, self._sensed, self._lasting, self.unmodelled, self.sudden)
+        _observe(*last, M, bias, v, tau, sensed, rates, state)
+
+
+@njit(cache=True)
+def _observe(M_before, v_before, M, bias, v, tau, sensed, rates, state):
+    period, blend, creep = rates
+    everything, from_sensor, lasting, unmodelled, sudden = state
+    for i in range(len(v)):
         # Over one period p changes by M̄ Δq̇ + ΔM q̇̄, and the second part is the integral of Ṁ q̇.
-        gained = 0.5 * ((M + M_before) @ (v - v_before))
-        outside = gained / self._period + bias - tau
-        self._all += self._blend * (outside - self._all)
-        self._sensed += self._blend * (sensed - self._sensed)
-        self.unmodelled = self._all - self._sensed
-        self._lasting += self._creep * (self.unmodelled - self._lasting)
-        self.sudden = self.unmodelled - self._lasting
+        gained = 0.0
+        for j in range(len(v)):
+            gained += 0.5 * (M[i, j] + M_before[i, j]) * (v[j] - v_before[j])
+        everything[i] += blend * (gained / period + bias[i] - tau[i] - everything[i])
+        from_sensor[i] += blend * (sensed[i] - from_sensor[i])
+        unmodelled[i] = everything[i] - from_sensor[i]
+        lasting[i] += creep * (unmodelled[i] - lasting[i])
+        sudden[i] = unmodelled[i] - lasting[i]

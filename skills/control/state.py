@@ -15,8 +15,7 @@ class ArmState:
     """Model quantities at configuration q and velocity v (7,).
 
     M (7,7) joint inertia; bias (7,) Coriolis and gravity torques. At the tool centre G, in W axes:
-    J (6,7), drift (6,) = J̇ v (classical), p (3,), R (3,3), V (6,), mobility (6,6) = J M⁻¹ Jᵀ, the
-    inverse of the task-space inertia Λ. `twist` and `acceleration` (at zero q̈) are spatial, in G.
+    J (6,7), drift (6,) = J̇ v (classical), p (3,), R (3,3), V (6,).
     """
 
     q: np.ndarray
@@ -28,7 +27,11 @@ class ArmState:
     p: np.ndarray
     R: np.ndarray
     V: np.ndarray
-    mobility: np.ndarray
+
+    @property
+    def mobility(self) -> np.ndarray:
+        """J M⁻¹ Jᵀ (6,6), the inverse of the task-space inertia Λ."""
+        return self.J @ np.linalg.solve(self.M, self.J.T)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +52,6 @@ def measure(robot: RobotModel, data: pin.Data, q: np.ndarray, v: np.ndarray) -> 
     model, tool = robot.model, robot.tcp_id
     bias = pin.nonLinearEffects(model, data, q, v)
     M = pin.crba(model, data, q)
-    M_inverse = pin.computeMinverse(model, data, q)
     J = np.ascontiguousarray(pin.computeFrameJacobian(model, data, q, tool, WORLD_AXES))
     pin.forwardKinematics(model, data, q, v, _AT_REST)
     pose = pin.updateFramePlacement(model, data, tool)
@@ -63,7 +65,6 @@ def measure(robot: RobotModel, data: pin.Data, q: np.ndarray, v: np.ndarray) -> 
         p=pose.translation.copy(),
         R=pose.rotation.copy(),
         V=J @ v,
-        mobility=J @ M_inverse @ J.T,
     )
 
 

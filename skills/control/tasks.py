@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
+from numba import njit
 
 from skills.control.state import ArmState, Target
 
@@ -73,10 +73,9 @@ class PostureTask:
     a: np.ndarray
 
     def rows(self, state: ArmState) -> Rows:
-        row = null_direction(state.J) @ state.M
-        row /= math.sqrt(row @ row) + 1e-9
-        wanted = self.a + DAMPED * (self.v - state.v) + STIFF * (self.q - state.q)
-        return Rows(row[None], np.array([row @ wanted]))
+        row, wanted = np.empty((1, 7)), np.empty(1)
+        _posture_row(state.J, state.M, self.q, self.v, self.a, state.q, state.v, row, wanted)
+        return Rows(row, wanted)
 
 
 class PoseTask:
@@ -119,11 +118,10 @@ class HybridTask:
     R_WC: np.ndarray
 
     def rows(self, state: ArmState) -> Rows:
-        wanted = self.target.A + DAMPED * (self.target.V - state.V) + STIFF * pose_error(self.target, state)
-        normal = self.R_WC[:, 2]
-        along = wanted[:3] @ normal
-        wanted[:3] += normal * (-SINK_DAMPING * (state.V[:3] @ normal) - along)
-        return Rows(state.J, wanted - state.drift)
+        target, wanted = self.target, np.empty(6)
+        _fill_pose_error(target.p, target.R, state.p, state.R, wanted)
+        _hybrid_acceleration(wanted, target.V, target.A, state.V, state.drift, self.R_WC)
+        return Rows(state.J, wanted)
 
 
 def pose_error(target: Target, state: ArmState) -> np.ndarray:
@@ -131,24 +129,128 @@ def pose_error(target: Target, state: ArmState) -> np.ndarray:
 
     The rotation comes from the unit quaternion of R_d Rᵀ, on the hemisphere of the shorter turn.
     """
-    turn = pin.Quaternion(target.R @ state.R.T)
-    x, y, z, w = turn.x, turn.y, turn.z, turn.w
-    if w < 0.0:
-        x, y, z, w = -x, -y, -z, -w
-    sine = math.sqrt(x * x + y * y + z * z)
-    scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, w) / sine
     error = np.empty(6)
-    error[:3] = target.p - state.p
-    error[3:] = scale * x, scale * y, scale * z
+    _fill_pose_error(target.p, target.R, state.p, state.R, error)
     return error
 
 
 def null_direction(J: np.ndarray) -> np.ndarray:
     """The joint velocity (7,) that doesn't move the tool: the generalised cross product of J's (6,7)
     rows. It varies smoothly with J and vanishes where the tool loses a freedom."""
-    return _SIGNS * np.linalg.det(J[:, _WITHOUT].transpose(1, 0, 2))
+    n = np.empty(7)
+    _fill_null_direction(J, n)
+    return n
 
 
 _EYE = np.eye(7)
-_SIGNS = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
-_WITHOUT = np.array([[j for j in range(7) if j != i] for i in range(7)])
+
+
+@njit(cache=True)
+def _fill_pose_error(p_d: np.ndarray, R_d: np.ndarray, p: np.ndarray, R: np.ndarray, error: np.ndarray) -> None:
+    Q = np.empty((3, 3))
+    for i in range(3):
+        error[i] = p_d[i] - p[i]
+        for j in range(3):
+            Q[i, j] = R_d[i, 0] * R[j, 0] + R_d[i, 1] * R[j, 1] + R_d[i, 2] * R[j, 2]
+    # Unit quaternion of Q, from whichever of its components is large (Shepperd, 1978).
+    trace = Q[0, 0] + Q[1, 1] + Q[2, 2]
+    u = np.empty(3)
+    if trace > 0.0:
+        root = math.sqrt(1.0 + trace)
+        w = root / 2
+        u[0], u[1], u[2] = Q[2, 1] - Q[1, 2], Q[0, 2] - Q[2, 0], Q[1, 0] - Q[0, 1]
+        u /= 2 * root
+    else:
+        i = 0
+        if Q[1, 1] > Q[0, 0]:
+            i = 1
+        if Q[2, 2] > Q[i, i]:
+            i = 2
+        j, k = (i + 1) % 3, (i + 2) % 3
+        root = math.sqrt(max(1.0 + Q[i, i] - Q[j, j] - Q[k, k], 0.0))
+        u[i] = root / 2
+        u[j], u[k] = (Q[i, j] + Q[j, i]) / (2 * root), (Q[i, k] + Q[k, i]) / (2 * root)
+        w = (Q[k, j] - Q[j, k]) / (2 * root)
+    if w < 0.0:
+        w, u = -w, -u
+    sine = math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+    scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, w) / sine
+    for i in range(3):
+        error[3 + i] = scale * u[i]
+
+
+@njit(cache=True)
+def _hybrid_acceleration(
+    wanted: np.ndarray, V_d: np.ndarray, A_d: np.ndarray, V: np.ndarray, drift: np.ndarray, R_WC: np.ndarray
+) -> None:
+    """From the pose error (6,) in `wanted` to the rows' b."""
+    along = sinking = 0.0
+    for i in range(6):
+        wanted[i] = A_d[i] + DAMPED * (V_d[i] - V[i]) + STIFF * wanted[i]
+    for i in range(3):
+        along += wanted[i] * R_WC[i, 2]
+        sinking += V[i] * R_WC[i, 2]
+    for i in range(3):
+        wanted[i] -= R_WC[i, 2] * (SINK_DAMPING * sinking + along)
+    for i in range(6):
+        wanted[i] -= drift[i]
+
+
+@njit(cache=True)
+def _posture_row(
+    J: np.ndarray,
+    M: np.ndarray,
+    q_d: np.ndarray,
+    v_d: np.ndarray,
+    a_d: np.ndarray,
+    q: np.ndarray,
+    v: np.ndarray,
+    row: np.ndarray,
+    wanted: np.ndarray,
+) -> None:
+    n = np.empty(7)
+    _fill_null_direction(J, n)
+    square = 0.0
+    for i in range(7):
+        row[0, i] = 0.0
+        for j in range(7):
+            row[0, i] += n[j] * M[j, i]
+        square += row[0, i] ** 2
+    wanted[0] = 0.0
+    for i in range(7):
+        row[0, i] /= math.sqrt(square) + 1e-9
+        wanted[0] += row[0, i] * (a_d[i] + DAMPED * (v_d[i] - v[i]) + STIFF * (q_d[i] - q[i]))
+
+
+@njit(cache=True)
+def _fill_null_direction(J: np.ndarray, n: np.ndarray) -> None:
+    block = np.empty((6, 6))
+    for left_out in range(7):
+        for i in range(6):
+            for j in range(6):
+                block[i, j] = J[i, j if j < left_out else j + 1]
+        sign = 1.0 if left_out % 2 == 0 else -1.0
+        n[left_out] = sign * _determinant(block)
+
+
+@njit(cache=True)
+def _determinant(A: np.ndarray) -> float:
+    """By elimination with row pivoting; A is overwritten."""
+    size, found = len(A), 1.0
+    for k in range(size):
+        best = k
+        for i in range(k + 1, size):
+            if abs(A[i, k]) > abs(A[best, k]):
+                best = i
+        if A[best, k] == 0.0:
+            return 0.0
+        if best != k:
+            for j in range(k, size):
+                A[k, j], A[best, j] = A[best, j], A[k, j]
+            found = -found
+        found *= A[k, k]
+        for i in range(k + 1, size):
+            factor = A[i, k] / A[k, k]
+            for j in range(k + 1, size):
+                A[i, j] -= factor * A[k, j]
+    return found

@@ -7,6 +7,7 @@ from sim.wrench import Wrench
 from skills.control.contact import ContactWrench, Touch, hand_inertia
 from skills.control.force import ForceLoop, smooth_step
 from skills.control.reference import Reference
+from skills.control.state import measure
 
 PERIOD = 0.002
 
@@ -45,8 +46,8 @@ def test_weight_and_inertia_of_hand_and_load_are_taken_off(robot):
         q, v, a = rng.uniform(-1.0, 1.0, (3, 7))
         contact = ContactWrench(robot, PERIOD)
         contact.carry(load)
-        contact.update(q, v - a * PERIOD, Wrench.zero())
-        contact.update(q, v, sensed(robot, q, v, a, load, push))
+        contact.update(measure(robot, robot.data(), q, v - a * PERIOD), Wrench.zero())
+        contact.update(measure(robot, robot.data(), q, v), sensed(robot, q, v, a, load, push))
         np.testing.assert_allclose(contact.raw, push, atol=1e-9)
 
 
@@ -58,13 +59,16 @@ def test_taring_takes_off_an_error_of_the_sensor_wherever_the_hand_turns(robot):
         true = sensed(robot, q, still, still, nothing, np.zeros(6))
         return Wrench(true.force + offset.force, true.torque + offset.torque)
 
+    def at(q):
+        return measure(robot, robot.data(), q, still)
+
     contact = ContactWrench(robot, PERIOD)
     for _ in range(200):
-        contact.update(np.full(7, 0.3), still, reading(np.full(7, 0.3)))
+        contact.update(at(np.full(7, 0.3)), reading(np.full(7, 0.3)))
     assert np.linalg.norm(contact.smooth) > 0.3
     contact.tare()
     for _ in range(200):
-        contact.update(np.full(7, -0.4), still, reading(np.full(7, -0.4)))
+        contact.update(at(np.full(7, -0.4)), reading(np.full(7, -0.4)))
     assert np.linalg.norm(contact.smooth) < 1e-3
 
 

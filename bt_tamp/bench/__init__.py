@@ -1,0 +1,1 @@
+"""Benchmarks: measured figures beside what they should be."""

@@ -1,0 +1,159 @@
+"""`bench control`: what one control tick costs, part by part, beside the bare physics that it drives."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from py_trees.trees import BehaviourTree
+from rich.console import Console
+from rich.table import Table
+
+from bt_tamp.bench.checks import Check, at_least, at_most
+from bt_tamp.bench.stopwatch import Stopwatch
+from bt_tamp.executive.build import CONTROL_EVERY, TREE_EVERY, Machine, build
+from bt_tamp.options import RunOptions
+from scenarios.load import load_scenario
+from sim.plant import Command
+
+SCENE = "fig1_wipe"
+WIPING = frozenset({"touch", "slide"})
+FREE = frozenset({"move", "approach"})
+
+CONTROL_PARTS = ("model", "state", "QP build", "solve", "command")
+PARTS = ("observe", *CONTROL_PARTS, "apply", "tree", "drive", "physics")
+"""In the order of a tick. drive: torques and the fingers' gear given to the engine; physics: the engine's bare step."""
+
+THINKING = 0.05
+"""CPU seconds beyond which a tick of the tree has planned: left out, as planning isn't control."""
+
+LONGEST = 120.0
+ENOUGH = 3.0
+"""Simulated seconds: in all, and of each regime."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """One regime, "free" or "wiping". Per control tick, in microseconds of CPU time: the mean of each part, and the
+    median of building and solving the QP. real_time: simulated seconds by seconds of CPU, everything included but
+    planning."""
+
+    regime: str
+    seconds: float
+    parts: dict[str, float]
+    qp_median: float
+    real_time: float
+
+    @property
+    def control(self) -> float:
+        """Control and tree, µs a tick."""
+        return sum(self.parts[part] for part in (*CONTROL_PARTS, "tree"))
+
+    @property
+    def physics(self) -> float:
+        """The bare physics that a tick drives, µs."""
+        return self.parts["physics"]
+
+
+def measure(seed: int) -> list[Cost]:
+    """Clear SCENE's table until enough was seen of moving freely and of wiping.
+
+    Raises ValueError if no stroke comes within LONGEST simulated seconds.
+    """
+    machine = build(load_scenario(SCENE, seed), RunOptions(seed=seed), _ignore, _ignore)
+    watches = {"free": Stopwatch(), "wiping": Stopwatch(), "": Stopwatch()}
+    spent = {regime: [0.0, 0.0] for regime in watches}
+    tree = BehaviourTree(machine.mission.root)
+    tick = 0
+    while machine.context.observation.t < LONGEST and min(spent[r][0] for r in ("free", "wiping")) < ENOUGH:
+        regime = _regime(machine)
+        before = time.thread_time()
+        thought = _tick(machine, tree, tick, watches[regime])
+        spent[regime][0] += CONTROL_EVERY * machine.plant.timestep
+        spent[regime][1] += time.thread_time() - before - thought
+        tick += 1
+    machine.plant.close()
+    if not spent["wiping"][0]:
+        raise ValueError(f"{SCENE}, seed {seed}: no stroke within {LONGEST:g} simulated seconds")
+    return [_cost(regime, watches[regime], *spent[regime]) for regime in ("free", "wiping")]
+
+
+def _tick(machine: Machine, tree: BehaviourTree, tick: int, watch: Stopwatch) -> float:
+    """One control period, as the executive's loop does it. Returns the CPU seconds that were spent on planning."""
+    plant, context = machine.plant, machine.context
+    plant.lap = context.controller.lap = watch.lap
+    thought = 0.0
+    watch.start()
+    observation = plant.observe()
+    context.observation = observation
+    watch.lap("observe")
+    if tick % TREE_EVERY == 0:
+        begun = time.thread_time()
+        context.scene = machine.belief.update(observation, context.grip.is_closing)
+        tree.tick()
+        took = time.thread_time() - begun
+        if took > THINKING:
+            thought = took
+            watch.start()
+        else:
+            watch.lap("tree")
+    tau = context.controller.update(observation)
+    plant.apply(Command(tau, context.grip.command(observation)))
+    watch.lap("apply")
+    for _ in range(CONTROL_EVERY):
+        plant.step()
+    return thought
+
+
+def _regime(machine: Machine) -> str:
+    phase = machine.context.phase
+    reference = machine.context.controller.reference
+    if phase is None or reference is None:
+        return ""
+    return "wiping" if phase.kind in WIPING else "free" if phase.kind in FREE else ""
+
+
+def _cost(regime: str, watch: Stopwatch, simulated: float, real: float) -> Cost:
+    ticks = simulated / (CONTROL_EVERY * 1e-3)
+    parts = {part: 1e6 * watch.total(part) / ticks for part in PARTS}
+    qp = watch.median("QP build") + watch.median("solve")
+    return Cost(regime, simulated, parts, qp, simulated / real)
+
+
+def middle(runs: Sequence[Sequence[Cost]]) -> list[Cost]:
+    """Of several runs, for each regime, the one in the middle by its real-time factor: other load comes and goes."""
+    regimes = zip(*runs, strict=True)
+    return [sorted(costs, key=lambda cost: cost.real_time)[len(costs) // 2] for costs in regimes]
+
+
+def acceptance(costs: Sequence[Cost]) -> list[Check]:
+    """The figures to reach."""
+    wiping = [cost for cost in costs if cost.regime == "wiping"]
+    shares = [cost.control / cost.physics for cost in wiping]
+    return [
+        at_most("wiping: control and tree, as a share of the bare physics", shares, 1.0, "times"),
+        at_least("wiping: real-time factor", [cost.real_time for cost in wiping], 3.0, "times"),
+        at_most("wiping: QP, build and solve, median", [cost.qp_median for cost in wiping], 120.0, "µs"),
+    ]
+
+
+def print_costs(console: Console, costs: Sequence[Cost]) -> None:
+    """The table: one line a part."""
+    table = Table(
+        caption=f"µs of CPU time a control tick (2 ms simulated: {CONTROL_EVERY} physics steps), mean over {SCENE}",
+        caption_justify="left",
+    )
+    table.add_column("part")
+    for cost in costs:
+        table.add_column(f"{cost.regime}\n({cost.seconds:.0f} s)", justify="right")
+    for part in PARTS:
+        table.add_row(part, *(f"{cost.parts[part]:.0f}" for cost in costs))
+    table.add_section()
+    table.add_row("control and tree", *(f"{cost.control:.0f}" for cost in costs))
+    table.add_row("bare physics", *(f"{cost.physics:.0f}" for cost in costs))
+    table.add_row("QP, median", *(f"{cost.qp_median:.0f}" for cost in costs))
+    table.add_row("real-time factor", *(f"{cost.real_time:.2f}" for cost in costs))
+    console.print(table)
+
+
+def _ignore(*_: object, **__: object) -> None:
+    """Drop an event."""
