@@ -88,7 +88,7 @@ class PlanRefiner:
             )
             if isinstance(outcome, Refinement):
                 after, resumed = self._after(plan, position, situation, outcome)
-                chosen.append(Chosen(position, step, outcome, situation))
+                chosen.append(Chosen(position, _as_predicted(step, situation.facts, after.facts), outcome, situation))
                 if resumed is not None:
                     self._report("refined", {"action": str(step.action)})
                     situation, position = after, resumed
@@ -128,6 +128,13 @@ class PlanRefiner:
         kept = {fact for fact in plan.steps[position].apply(before.facts) if fact.predicate not in OBSERVED}
         facts = frozenset(kept) | self._state(scene)
         return before.after(refinement.action, scene, facts), resume_at(plan, facts, position + 1)
+
+
+def _as_predicted(step: Step, before: frozenset[Fact], after: frozenset[Fact]) -> Step:
+    """The step with everything that the refined action is predicted to bring about: a stroke takes more than one crumb
+    along, and the rest of the plan counts on it."""
+    expected = step.apply(before)
+    return replace(step, adds=step.adds | (after - expected), deletes=step.deletes | (expected - after))
 
 
 def _spoiled(refinement: Refinement) -> RefinementFailure:

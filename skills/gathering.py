@@ -61,9 +61,9 @@ class Place:
     opening: Opening
     crumbs: Crumbs
 
-    def taken(self, stroke: Stroke) -> np.ndarray:
-        """Which crumbs (n,) the stroke brings through the opening."""
-        return taken(stroke, self.tool, self.crumbs, self.opening)
+    def taken(self, stroke: Stroke, surely: bool = True) -> np.ndarray:
+        """Which crumbs (n,) the stroke brings through the opening, see `strokes.taken`."""
+        return taken(stroke, self.tool, self.crumbs, self.opening, surely)
 
     def cost(self, stroke: Stroke, mask: np.ndarray) -> float:
         """What a stroke counts for among those that take the same crumbs, in metres."""

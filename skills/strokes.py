@@ -208,10 +208,13 @@ def is_supported(table: Table, tool: Tool, front: np.ndarray, heading: float) ->
     return bool(np.all(np.abs(p) <= np.array(table.size[:2]) / 2))
 
 
-def taken(stroke: Stroke, tool: Tool, crumbs: Crumbs, opening: Opening) -> np.ndarray:
-    """Which crumbs (n,) the stroke brings through the opening."""
-    when, where = stroke.met(crumbs.p, tool.width / 2)
-    kept = np.isfinite(when) & (when >= crumbs.r) & (np.abs(where) + crumbs.r <= tool.width / 2 - EDGE)
+def taken(stroke: Stroke, tool: Tool, crumbs: Crumbs, opening: Opening, surely: bool = True) -> np.ndarray:
+    """Which crumbs (n,) the stroke brings through the opening: surely those wholly before the sponge, most likely all
+    whose middle the sponge or a finger meets."""
+    when, where = stroke.met(crumbs.p, tool.span / 2)
+    kept = np.isfinite(when) & (when >= crumbs.r)
+    if surely:
+        kept &= np.abs(where) + crumbs.r <= tool.width / 2 - EDGE
     crossing, needed = crossing_of(stroke, opening, where)
     inside = np.abs(crossing) + crumbs.r <= opening.half_width - SIDE_MARGIN
     return kept & inside & (needed + OVERRUN <= stroke.last + 1e-9) & (when <= stroke.length)

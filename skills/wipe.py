@@ -94,7 +94,7 @@ class Wipe:
         assert scene.held is not None
         place = self._place(scene, scene.held, refinement.action)
         assert place is not None
-        mask = place.taken(refinement.sample.stroke)
+        mask = place.taken(refinement.sample.stroke, surely=False)
         swept = {crumb, *(name for name, is_taken in zip(place.crumbs.names, mask, strict=True) if is_taken)}
         lower, upper = interior(scene.scenario.regions[pan])
         for name, spot in zip(sorted(swept), _spots(lower, upper, len(swept)), strict=True):

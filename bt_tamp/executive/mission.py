@@ -13,22 +13,18 @@ The outcome is judged by `goal reached?` alone; `act` coming to its end never en
 
 from dataclasses import dataclass
 
-import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector, Sequence
 
 from bt_tamp.executive.agenda import Agenda
+from bt_tamp.executive.rest import moving
 from planner.task.symbols import Fact
 from skills.context import SkillContext
 from skills.motions import sequence
 
 GOAL_TIME = 0.5
 """Seconds for which the goal must hold, everything at rest."""
-
-REST_SPEED = 0.01
-REST_TURN = 0.2
-"""m/s and rad/s below which a body is at rest."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +57,7 @@ class GoalReached(Behaviour):
         context = self._context
         observation = context.observation
         missing = self._agenda.goal - self._agenda.facts(context.scene)
-        moving = [name for name, V_WO in observation.velocities.items() if _moves(V_WO)]
-        if missing or moving or not self._agenda.is_between_actions:
+        if missing or moving(observation) or not self._agenda.is_between_actions:
             self._since = None
             self.feedback_message = _still_missing(missing)
             return Status.FAILURE
@@ -90,10 +85,6 @@ class PlanStillGood(Behaviour):
 def planning(lift_off: Behaviour, plan: Behaviour) -> Behaviour:
     """Leave contact first, then plan."""
     return sequence("plan", lift_off, plan)
-
-
-def _moves(V_WO: np.ndarray) -> bool:
-    return bool(np.linalg.norm(V_WO[:3]) > REST_SPEED or np.linalg.norm(V_WO[3:]) > REST_TURN)
 
 
 def _still_missing(missing: frozenset[Fact]) -> str:

@@ -8,6 +8,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tamp.executive.agenda import Agenda
+from bt_tamp.executive.rest import moving
 from planner.failure import ExecutionFailure, RefinementFailure
 from planner.refinement import Refinement, Work
 from planner.search_then_sample import NoPlan, SearchThenSample, Solution
@@ -17,6 +18,9 @@ from skills.context import SkillContext
 
 COST = {"checks": 5e-6, "exact_checks": 2e-5, "ik": 1e-4, "expansions": 1e-4}
 """Simulated seconds that one unit of planning work costs: the world does not stop while the robot thinks."""
+
+PATIENCE = 2.0
+"""Seconds for which planning waits, at most, until what falls or rolls has come to rest."""
 
 
 @dataclass
@@ -70,7 +74,7 @@ class Planner:
 
 
 class PlanNode(Behaviour):
-    """Plans, lets the simulated time that this costs pass, then puts the plan in force.
+    """Plans once everything is at rest, lets the simulated time that this costs pass, then puts the plan in force.
 
     Fails when there is no plan; `planner.thinking.verdict` says why.
     """
@@ -79,15 +83,20 @@ class PlanNode(Behaviour):
         super().__init__("plan")
         self._planner, self._agenda, self._context = planner, agenda, context
         self._outcome: Solution | NoPlan | None = None
+        self._since = 0.0
         self._ready_at = 0.0
         self._why = "planned"
 
     def initialise(self) -> None:
         self._outcome = None
+        self._since = self._context.observation.t
 
     def update(self) -> Status:
         context, thinking = self._context, self._planner.thinking
         if self._outcome is None:
+            observation = context.observation
+            if moving(observation) and observation.t - self._since < PATIENCE:
+                return Status.RUNNING
             self._take_in_failure()
             before = thinking.simulated_cost()
             self._outcome = self._planner.plan(context.scene, self._agenda)

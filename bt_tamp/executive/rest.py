@@ -1,0 +1,18 @@
+"""What moves: planning and judging a run wait until things have come to rest."""
+
+import numpy as np
+
+from sim.plant import Observation
+
+REST_SPEED = 0.01
+REST_TURN = 0.2
+"""m/s and rad/s below which a body is at rest."""
+
+
+def moving(observation: Observation) -> list[str]:
+    """Names of the bodies that are not at rest."""
+    return [name for name, V_WO in observation.velocities.items() if _moves(V_WO)]
+
+
+def _moves(V_WO: np.ndarray) -> bool:
+    return bool(np.linalg.norm(V_WO[:3]) > REST_SPEED or np.linalg.norm(V_WO[3:]) > REST_TURN)
