@@ -5,10 +5,11 @@ couples the two fingers, as the gear does in the real gripper. Two frictions com
 """
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +24,8 @@ from sim.plant import Command, GripCommand, Observation
 from sim.robot import GRAVITY, RobotModel
 from sim.scene import floor_height
 from sim.wrench import Wrench
+
+T = TypeVar("T")
 
 PHYSICS_STEP = 1e-3
 """Seconds a step: at 240 Hz a sponge held by friction turns in the hand."""
@@ -102,8 +105,8 @@ class BulletPlant:
         for name, body in self._bodies.items():
             position, quaternion = p.getBasePositionAndOrientation(body, physicsClientId=self._client)
             linear, angular = p.getBaseVelocity(body, physicsClientId=self._client)
-            poses[name] = pin.XYZQUATToSE3(np.array(position + quaternion))
-            velocities[name] = np.array(linear + angular)
+            poses[name] = position + quaternion
+            velocities[name] = linear + angular
         return Observation(
             t=self._t,
             q=np.array([state[0] for state in arm]),
@@ -113,8 +116,8 @@ class BulletPlant:
             opening_velocity=fingers[0][1] + fingers[1][1],
             grip_force=(abs(fingers[0][3]) + abs(fingers[1][3])) / 2,
             wrist=Wrench(force, self._lever @ force - np.array(sensor[3:])),
-            poses=poses,
-            velocities=velocities,
+            poses=_Converted(poses, _pose),
+            velocities=_Converted(velocities, np.array),
         )
 
     def apply(self, command: Command) -> None:
@@ -361,3 +364,26 @@ class BulletPlant:
 
 def _nobody(part: str) -> None:
     """Takes no times."""
+
+
+class _Converted(Mapping[str, T], Generic[T]):
+    """What the engine said of each body, converted when it is asked for: most control ticks look at the arm only."""
+
+    def __init__(self, raw: dict[str, tuple[float, ...]], convert: Callable[[tuple[float, ...]], T]) -> None:
+        self._raw, self._convert = raw, convert
+        self._known: dict[str, T] = {}
+
+    def __getitem__(self, name: str) -> T:
+        if name not in self._known:
+            self._known[name] = self._convert(self._raw[name])
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._raw)
+
+    def __len__(self) -> int:
+        return len(self._raw)
+
+
+def _pose(xyzquat: tuple[float, ...]) -> SE3:
+    return pin.XYZQUATToSE3(np.array(xyzquat))

@@ -19,7 +19,7 @@ SCENE = "fig1_wipe"
 WIPING = frozenset({"touch", "slide"})
 FREE = frozenset({"move", "approach"})
 
-CONTROL_PARTS = ("model", "state", "QP build", "solve", "command")
+CONTROL_PARTS = ("model", "state", "law", "QP build", "solve", "command")
 PARTS = ("observe", *CONTROL_PARTS, "apply", "tree", "drive", "physics")
 """In the order of a tick. drive: torques and the fingers' gear given to the engine; physics: the engine's bare step."""
 

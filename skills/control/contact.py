@@ -80,8 +80,9 @@ class ContactWrench:
     @property
     def credible(self) -> np.ndarray:
         """`raw` (6,) as far as it is more than the sensor's own error: nothing below half of SENSOR_ERROR."""
-        force, torque = self.raw[:3], self.raw[3:]
-        size = math.sqrt(max(force @ force / SENSOR_ERROR[0] ** 2, torque @ torque / SENSOR_ERROR[1] ** 2))
+        x, y, z, a, b, c = self.raw.tolist()
+        force, torque = math.sqrt(x * x + y * y + z * z), math.sqrt(a * a + b * b + c * c)
+        size = max(force / SENSOR_ERROR[0], torque / SENSOR_ERROR[1])
         return self.raw * smooth_step(2.0 * size - 1.0)
 
     def _go_on_taring(self, mean: "_Mean", contact: np.ndarray) -> np.ndarray:

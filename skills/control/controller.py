@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from numba import njit
 
 from planner.motion.trajectory import Trajectory
 from sim.plant import Observation
@@ -241,6 +242,7 @@ class ArmController:
         self.lap("state")
         tasks, wrench, limits = self._law(state)
         feedforward = self._bridge.advance() - state.J.T @ wrench - self._compensation()
+        self.lap("law")
         solution = self._qp.solve(state, tasks, feedforward, limits)
         self._course.advance(self._period)
         tau = solution.tau
@@ -276,9 +278,7 @@ class ArmController:
         """Torques (7,) taken for the model's errors. They change slowly enough for an impact, which the observer
         and the sensor see at slightly different times, to make no step."""
         wanted = self._observer.unmodelled if self._unexplained is None else self._unexplained
-        wanted = np.minimum(np.maximum(wanted, -self._compensated), self._compensated)
-        most = COMPENSATION_RATE * self._period
-        self._lacking = self._lacking + np.minimum(np.maximum(wanted - self._lacking, -most), most)
+        _creep(wanted, self._compensated, COMPENSATION_RATE * self._period, self._lacking)
         return self._lacking
 
     def _stop(self, reason: Stop, state: ArmState) -> None:
@@ -364,3 +364,11 @@ class ArmController:
 
 _UP = np.array([0.0, 0.0, 1.0])
 _NO_WRENCH = np.zeros(6)
+
+
+@njit(cache=True)
+def _creep(wanted: np.ndarray, bound: np.ndarray, most: float, value: np.ndarray) -> None:
+    """Move `value` (7,) by at most `most` towards `wanted`, which counts up to `bound`."""
+    for i in range(len(value)):
+        goal = min(max(wanted[i], -bound[i]), bound[i])
+        value[i] += min(max(goal - value[i], -most), most)

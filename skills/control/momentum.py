@@ -27,7 +27,7 @@ class MomentumObserver:
         self._period = period
         self._blend = 1.0 - np.exp(-GAIN * period)
         self._creep = 1.0 - np.exp(-SLOW * period)
-        self._last: tuple[np.ndarray, np.ndarray] | None = None
+        self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self.reset()
 
     def reset(self) -> None:
@@ -46,7 +46,7 @@ class MomentumObserver:
     def update(self, M: np.ndarray, bias: np.ndarray, v: np.ndarray, tau: np.ndarray, sensed: np.ndarray) -> None:
         """Take in one period: M (7,7), bias h (7,) and v (7,) now, the torques tau (7,) that acted since the last
         call, and the torques (7,) by which the wrist sensor explains outside forces."""
-        last, self._last = self._last, (M, v)
+        last, self._last = self._last, (M, bias, v)
         if last is None:
             return
         self.unmodelled, self.sudden = np.empty(7), np.empty(7)
@@ -56,7 +56,7 @@ class MomentumObserver:
 
 
 @njit(cache=True)
-def _observe(M_before, v_before, M, bias, v, tau, sensed, rates, state):
+def _observe(M_before, bias_before, v_before, M, bias, v, tau, sensed, rates, state):
     period, blend, creep = rates
     everything, from_sensor, lasting, unmodelled, sudden = state
     for i in range(len(v)):
@@ -64,7 +64,8 @@ def _observe(M_before, v_before, M, bias, v, tau, sensed, rates, state):
         gained = 0.0
         for j in range(len(v)):
             gained += 0.5 * (M[i, j] + M_before[i, j]) * (v[j] - v_before[j])
-        everything[i] += blend * (gained / period + bias[i] - tau[i] - everything[i])
+        outside = gained / period + 0.5 * (bias[i] + bias_before[i]) - tau[i]
+        everything[i] += blend * (outside - everything[i])
         from_sensor[i] += blend * (sensed[i] - from_sensor[i])
         unmodelled[i] = everything[i] - from_sensor[i]
         lasting[i] += creep * (unmodelled[i] - lasting[i])

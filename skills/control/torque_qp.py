@@ -60,6 +60,7 @@ class TorqueQP:
             PositionLimit(robot.q_min, robot.q_max, robot.a_max, period),
         )
         self._torque_limits = TorqueLimits(robot.tau_max)
+        self._rows = np.zeros((7 + SPARE_ROWS, 7)), np.empty(7 + SPARE_ROWS), np.empty(7 + SPARE_ROWS)
         self._last = np.zeros(7)
         self._last_feedforward = np.zeros(7)
         self._lap = lap
@@ -93,7 +94,7 @@ class TorqueQP:
 
     def joint_bounds(self, state: ArmState) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds (7,) on q̈; lower never exceeds upper."""
-        lower, upper = np.full(7, -FREE), np.full(7, FREE)
+        lower, upper = _LOWEST.copy(), _HIGHEST.copy()
         for bound in self._bounds:
             bound.narrow(state, lower, upper)
         return lower, upper
@@ -101,13 +102,15 @@ class TorqueQP:
     def _all_rows(
         self, state: ArmState, feedforward: np.ndarray, limits: Sequence[Row]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        R, lower, upper = np.zeros((7 + SPARE_ROWS, 7)), np.full(7 + SPARE_ROWS, -FREE), np.full(7 + SPARE_ROWS, FREE)
+        R, lower, upper = self._rows
+        lower[7:], upper[7:] = -FREE, FREE
         filled = 0
         for limit in (self._torque_limits, *limits):
             rows, low, high = limit.rows(state, feedforward)
             end = filled + len(rows)
             R[filled:end], lower[filled:end], upper[filled:end] = rows, low, high
             filled = end
+        R[filled:] = 0.0
         return R, lower, upper
 
     def _fall_back(self, state: ArmState, bounds: tuple[np.ndarray, np.ndarray], status: str) -> Solution:
@@ -131,3 +134,4 @@ def _add(A: np.ndarray, b: np.ndarray, weight: float, P: np.ndarray, g: np.ndarr
 
 
 _EYE = np.eye(7)
+_LOWEST, _HIGHEST = np.full(7, -FREE), np.full(7, FREE)

@@ -1,0 +1,198 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.motion.trajectory import Trajectory
+from sim.disturbance import DisturbedPlant, ForceDelay, ForceMissing, ForceNoise
+from sim.plant import Command
+from skills.control.controller import ArmController
+from skills.control.limits import FREE, ApproachLimit
+from skills.control.reference import Reference
+from skills.control.safety import (
+    Collision,
+    ForceTooHigh,
+    Guard,
+    SafetyLimits,
+    SensorLost,
+    TooFast,
+    TorqueSpent,
+)
+from skills.control.state import Target, measure
+from skills.control.tasks import HybridTask
+from skills.control.torque_qp import TorqueQP
+
+PERIOD = 0.002
+STILL = np.zeros(7)
+ALLOWED = np.array([0.0, -40.0, 0.0])
+
+
+def strict(rig, **limits):
+    """The rig's controller anew, with other safety limits."""
+    rig.controller = ArmController(rig.robot, PERIOD, SafetyLimits(**limits))
+    rig.run(0.05)
+    return rig
+
+
+def test_the_approach_is_limited_and_the_arm_does_not_stop_for_it(robot):
+    state = measure(robot, robot.data(), np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 80.0, 0.0]), STILL)
+    dive = Target(state.p - [0.0, 0.0, 0.5], state.R, np.zeros(6), np.zeros(6))
+    sideways = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    limit = ApproachLimit(np.array([0.0, 0.0, 1.0]), 0.05)
+    free = TorqueQP(robot, PERIOD).solve(state, [HybridTask(dive, sideways)], STILL)
+    kept = TorqueQP(robot, PERIOD).solve(state, [HybridTask(dive, sideways)], STILL, (limit,))
+    assert (state.J @ free.a + state.drift)[2] < -20.0
+    assert (state.J @ kept.a + state.drift)[2] == pytest.approx(-0.05 / 0.01, abs=0.01)
+    assert not kept.is_fallback
+
+
+def test_away_from_the_surface_nothing_is_limited(robot):
+    state = measure(robot, robot.data(), np.full(7, 0.3), STILL)
+    _, _, high = ApproachLimit(np.array([0.0, 0.0, 1.0]), 0.05).rows(state, STILL)
+    assert high[0] == FREE
+
+
+def test_a_tool_that_loses_the_table_sinks_no_faster_than_allowed(lab):
+    rig = lab.rig(lab.home)
+    rig.run(0.05)
+    rig.controller.follow(Reference(Trajectory.standstill(lab.home, 1.0), "hybrid", force=40.0))
+    speeds = rig.run(0.04, lambda _: -rig.controller._state.V[2])
+    assert max(speeds) < 0.08
+    assert rig.controller.stopped is None
+
+
+def test_a_contact_force_near_its_limit_stops_the_arm_which_then_gives_way(lab):
+    rig = strict(lab.rig(lab.home), contact_force=50.0)
+    rig.push = np.array([0.0, 0.0, 44.0])
+    rig.run(0.3)
+    assert rig.controller.stopped is None
+    rig.push = np.array([0.0, 0.0, 47.0])
+    rig.run(0.05)
+    assert isinstance(rig.controller.stopped, ForceTooHigh)
+    assert rig.controller.stopped.limit == 50.0
+    assert rig.controller.reference is None
+    assert not rig.controller.finished
+    assert rig.controller.collision is None
+
+
+def test_a_hand_near_its_speed_limit_is_braked_without_a_jerk(lab):
+    rig = strict(lab.rig(lab.home), speed=0.3)
+    rig.controller.follow(Reference(lab.straight(lab.home, [0.0, 0.3, 0.0], 0.4)))
+    steps = lab.steps(rig)
+
+    def look(observation):
+        steps(observation)
+        return np.linalg.norm(rig.controller._state.V[:3])
+
+    speeds = rig.run(1.0, look)
+    assert isinstance(rig.controller.stopped, TooFast)
+    assert max(speeds) < 0.3
+    assert speeds[-1] < 1e-2
+    assert steps.largest < 5.0
+
+
+def test_a_torque_limit_is_kept_and_working_at_it_stops_the_arm(lab):
+    rig = lab.rig(lab.home)
+    weak = replace_torques(rig.robot, 1.01 * np.abs(held_torques(rig)))
+    rig.controller = ArmController(weak, PERIOD)
+    rig.run(0.05)
+    rig.push = np.array([0.0, 0.0, -40.0])
+    rig.run(0.3)
+    assert isinstance(rig.controller.stopped, TorqueSpent)
+    assert rig.controller.torque_limit_violations == 0
+
+
+def held_torques(rig):
+    rig.run(0.2)
+    return np.maximum(np.abs(rig.tau), 5.0)
+
+
+def replace_torques(robot, tau_max):
+    weak = robot.with_payload(1e-9, np.zeros(3), 1e-12 * np.eye(3))
+    weak.tau_max = tau_max
+    return weak
+
+
+def test_a_blow_against_the_elbow_stops_the_arm_and_is_told(lab):
+    rig = lab.rig(lab.home)
+    rig.controller.follow(Reference(lab.straight(lab.home, [0.0, 0.3, 0.0], 0.25)))
+    rig.run(0.6)
+    assert rig.controller.collision is None
+    before = rig.q
+    for _ in range(60):
+        observation = rig.plant.observe()
+        rig.tau = rig.controller.update(observation)
+        rig.plant.apply(Command(rig.tau, rig.grip))
+        for _ in range(2):
+            rig.plant.push(np.array([0.0, -80.0, 0.0]), "link_4")
+            rig.plant.step()
+    told = rig.controller.collision
+    assert isinstance(told, Collision)
+    assert 3.0 < told.torque < 80.0
+    assert "joint" in str(told)
+    rig.run(1.0)
+    assert not rig.controller.finished
+    assert np.abs(rig.plant.observe().v).max() < 0.02
+    assert np.abs(rig.q - before).max() < 0.2
+    rig.controller.follow(Reference(Trajectory.standstill(rig.q)))
+    rig.run(0.3)
+    assert rig.controller.stopped is None
+    assert rig.controller.finished
+
+
+def test_ordinary_work_on_an_arm_with_friction_and_wrong_masses_is_no_collision(lab):
+    rig = lab.rig(lab.home)
+    rig.plant.set_joint_friction(np.full(7, 1.0))
+    rig.plant.scale_masses(1.2)
+    rig.run(0.3)
+    there = lab.straight(rig.q, [0.05, 0.3, -0.05], 0.4)
+    rig.follow(Reference(there))
+    rig.follow(Reference(lab.straight(rig.q, [-0.05, -0.3, 0.05], 0.4)))
+    assert rig.controller.stopped is None
+
+
+def test_a_wrist_sensor_that_falls_silent_while_pressing_stops_the_arm(lab):
+    rig = lab.gripped_sponge(0.6, 0.0, 0.01)
+    lower = lab.straight(rig.q, [0.0, 0.0, -0.02], 0.03)
+    rig.follow(Reference(lower, "hybrid", force=10.0, until_contact=True))
+    rig.plant = DisturbedPlant(rig.plant, [ForceMissing()])
+    rig.run(0.018)
+    assert rig.controller.stopped is None
+    rig.run(0.02)
+    assert isinstance(rig.controller.stopped, SensorLost)
+    assert np.all(np.isfinite(rig.tau))
+    rig.run(0.3)
+    assert np.abs(rig.plant.observe().v).max() < 0.02
+
+
+def test_in_free_motion_a_silent_sensor_changes_nothing(lab):
+    rig = lab.rig(lab.home)
+    rig.plant = DisturbedPlant(rig.plant, [ForceMissing()])
+    rig.follow(Reference(lab.straight(lab.home, [0.0, 0.1, 0.0], 0.2)))
+    assert rig.controller.finished
+
+
+def test_one_odd_reading_stops_nothing():
+    guard = Guard(SafetyLimits(contact_force=50.0), np.full(7, 100.0), PERIOD)
+    assert [guard.force(force) for force in (ALLOWED, 3 * ALLOWED, 3 * ALLOWED, ALLOWED)] == [None] * 4
+    assert [guard.force(3 * ALLOWED) for _ in range(3)][-1] == ForceTooHigh(120.0, 50.0)
+    hit = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0])
+    assert [guard.sudden(hit) for _ in range(3)] == [None] * 3
+    assert guard.sudden(hit) == Collision(7, 9.0)
+    guard.reset()
+    assert guard.sudden(hit) is None
+
+
+def test_a_tare_under_noise_and_delay_leaves_a_tenth_of_a_newton(lab):
+    rig = lab.rig(lab.home)
+    rig.plant = DisturbedPlant(rig.plant, [ForceNoise(0.3, 0.01, seed=3), ForceDelay(0.004)])
+    rig.run(0.2)
+    rig.controller.tare()
+    rig.run(0.2)
+    felt = np.mean(rig.run(0.5, lambda _: rig.controller._wrench.raw[:3]), axis=0)
+    assert np.abs(felt).max() < 0.1
+
+
+def test_reasons_are_plain_values():
+    assert replace(TooFast(1.0, 2.0), speed=1.5) == TooFast(1.5, 2.0)
+    assert str(SensorLost(0.022)) == "the wrist sensor has been silent for 22 ms"
