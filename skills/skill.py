@@ -150,9 +150,12 @@ def find_way(
     return failure or Unfit("the arm can't follow the hand's path")
 
 
-def hand_would_hit(toolkit: Toolkit, scene: SceneState, X_WG: SE3, allowed: frozenset[Pair]) -> Unfit | None:
-    """What the hand at X_WG would hit, whatever the arm does; movable bodies are culprits if nothing else is hit."""
-    hits = toolkit.motion.hand_hits(scene, X_WG, allowed)
+def hand_would_hit(
+    toolkit: Toolkit, scene: SceneState, X_WG: SE3, allowed: frozenset[Pair], margin: float | None = None
+) -> Unfit | None:
+    """What the hand at X_WG, with what it holds, would hit or come nearer to than `margin` metres, whatever the arm
+    does; movable bodies are culprits if nothing else is hit."""
+    hits = toolkit.motion.hand_hits(scene, X_WG, allowed, margin)
     if not hits:
         return None
     movable = hits & frozenset(scene.poses)

@@ -27,6 +27,8 @@ def sentence(event: Event) -> str | None:
             return f"{data['action']} failed: {data['reason']}"
         case "refined_again":
             return f"{data['action']} is worked out anew: {data['reason']}"
+        case "pressed_harder":
+            return f"{data['action']} slips: pressed with {data['force']:.0f} N from now on"
         case "replan":
             return f"planning again: {data['reason']}"
         case "goal_reached":

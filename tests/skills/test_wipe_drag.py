@@ -1,4 +1,4 @@
-"""Wipe and drag, carried out in PyBullet."""
+"""Wipe, carried out in PyBullet."""
 
 import numpy as np
 import pytest
@@ -39,23 +39,3 @@ def test_what_stands_between_crumb_and_pan_is_named_as_culprit():
     failure = bench.refine(action("wipe(carrot, table, dustpan)"))
     assert isinstance(failure, RefinementFailure)
     assert frozenset({"box"}) in failure.culprit_sets
-
-
-@pytest.mark.parametrize(("x", "y", "yaw"), [(0.58, 0.21, 0.0), (0.6, 0.18, 0.15)])
-def test_a_flat_book_is_dragged_to_an_overhang_and_can_then_be_picked(x, y, yaw):
-    bench = Bench(with_pose(scene_with("book"), "book", x, y, yaw))
-    assert bench.do("drag(book, table)") is Status.SUCCESS
-    assert place_of(bench.scene, "book") == "table"
-    assert bench.do("pick(book, table)") is Status.SUCCESS
-    assert bench.do("place(book, right_bin)") is Status.SUCCESS
-    assert place_of(bench.scene, "book") == "right_bin"
-
-
-def test_a_drag_that_finds_no_friction_is_refused():
-    from dataclasses import replace
-
-    scenario = scene_with("book")
-    slippery = replace(scenario, table=replace(scenario.table, friction=1.3))
-    failure = Bench(slippery).refine(action("drag(book, table)"))
-    assert isinstance(failure, RefinementFailure)
-    assert "friction" in failure.reason
