@@ -101,13 +101,14 @@ def cover(place: Place) -> list[Stroke]:
 
 def strokes_for(place: Place, name: str) -> Iterator[Stroke]:
     """Strokes that take a crumb: the one of the cover first, then straight and bent ones by turns: what blocks all of a
-    kind may not block the other."""
+    kind may not block the other. Last come those that most likely take it."""
     k = place.crumbs.names.index(name)
     best = [stroke for stroke in cover(place) if place.taken(stroke)[k]]
-    fans = [_in_order(place, [s for s in fan if place.taken(s)[k]]) for fan in _directed(place, k)]
-    straight = _by_turns(fans)
+    fans = list(_directed(place, k))
+    straight = _by_turns([_in_order(place, [s for s in fan if place.taken(s)[k]]) for fan in fans])
     bent = _in_order(place, list(bent_strokes(place, k)))
-    yield from dict.fromkeys([*best, *_by_turns([straight[::2], straight[1::2], bent])])
+    likely = _by_turns([_in_order(place, [s for s in fan if place.taken(s, surely=False)[k]]) for fan in fans])
+    yield from dict.fromkeys([*best, *_by_turns([straight[::2], straight[1::2], bent]), *likely])
 
 
 def _by_turns(lists: Sequence[Sequence[Stroke]]) -> list[Stroke]:
@@ -149,10 +150,9 @@ def _directed(place: Place, k: int) -> Iterator[list[Stroke]]:
     with the sponge at some offsets from it."""
     crumbs, opening = place.crumbs, place.opening
     p, r = crumbs.p[k], float(crumbs.r[k])
-    reach = opening.half_width - r - SIDE_MARGIN
-    if reach < 0.0:
-        return
-    square = float(np.clip((p - opening.middle) @ opening.across, -reach, reach))
+    reach = max(0.0, opening.half_width - r - SIDE_MARGIN)
+    widest = max(0.0, opening.half_width - r / 2)
+    square = float(np.clip((p - opening.middle) @ opening.across, -widest, widest))
     exits = [exit_ for exit_ in np.linspace(-reach, reach, EXITS) if abs(exit_ - square) > LATERAL_STEP]
     steps = int(max(place.tool.width / 2 - r - EDGE, 0.0) / LATERAL_STEP)
     for exit_ in [square, *sorted(exits, key=lambda exit_: abs(exit_ - square))]:

@@ -215,14 +215,15 @@ def is_supported(table: Table, tool: Tool, front: np.ndarray, heading: float) ->
 
 
 def taken(stroke: Stroke, tool: Tool, crumbs: Crumbs, opening: Opening, surely: bool = True) -> np.ndarray:
-    """Which crumbs (n,) the stroke brings through the opening: surely those wholly before the sponge, most likely all
-    whose middle the sponge or a finger meets."""
+    """Which crumbs (n,) the stroke brings through the opening: surely those that are wholly before the sponge and pass
+    clear of the dustpan's walls, most likely all whose middle the sponge or a finger meets."""
     when, where = stroke.met(crumbs.p, tool.span / 2)
     kept = np.isfinite(when) & (when >= crumbs.r)
     if surely:
         kept &= np.abs(where) + crumbs.r <= tool.width / 2 - EDGE
     crossing, needed = crossing_of(stroke, opening, where)
-    inside = np.abs(crossing) + crumbs.r <= opening.half_width - SIDE_MARGIN
+    aside = crumbs.r + SIDE_MARGIN if surely else crumbs.r / 2
+    inside = np.abs(crossing) + aside <= opening.half_width + 1e-9
     enough = needed + LEAST_OVERRUN - TIPPING * crumbs.r <= stroke.last
     return kept & inside & enough & (when <= stroke.length)
 

@@ -25,6 +25,7 @@ from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.gathering import Place, strokes_for
 from skills.motions import Follow, Slide, Touch, guarded, sequence
+from skills.pick import grip_force
 from skills.pressing import Pressing, in_order
 from skills.refine import PathFree, Refine
 from skills.skill import ContactSettings, Legs, Line, Toolkit, Unfit, Way, find_way, refine_by_sampling
@@ -37,6 +38,9 @@ CLOSE = 0.015
 
 PROBE = 0.015
 """Metres below the surface down to which touchdown is sought."""
+
+HOLD_SHARE = 0.6
+"""Share of what the grip on the sponge bears that is used when it is to be pressed harder."""
 
 LOOK = 0.02
 """Metres between the poses of the hand at which a stroke is looked at before a way for the arm is sought."""
@@ -53,14 +57,18 @@ class Wiping:
     pressing: Pressing
 
 
-def pressings(contact: ContactSettings) -> list[Pressing]:
-    """How a stroke may press: as set; harder and slower, for what a soft sponge passes over; lighter and slower, for
-    what it sticks to; slower, for what rolls away; and stiffer, for what holds it up."""
+def pressings(contact: ContactSettings, hold: float) -> list[Pressing]:
+    """How a stroke may press: as set; lighter and slower, for what it sticks to; harder and slower, for what a soft
+    sponge passes over; slower, for what rolls away; and stiffer, for what holds it up.
+
+    `hold`: N along the pads that the grip on the sponge bears. Pressed nearly as hard, it creeps up in the hand.
+    """
     usual = Pressing(contact.force, contact.speed, tuple(contact.stiffness))
+    harder = float(np.clip(HOLD_SHARE * hold / contact.force, 1.0, 2.0))
     return [
         usual,
-        usual.varied(force=2.0, speed=0.5),
         usual.varied(force=0.5, speed=0.5),
+        usual.varied(force=harder, speed=0.5),
         usual.varied(speed=0.3),
         usual.varied(stiffness=2.0, speed=0.5),
     ]
@@ -94,10 +102,12 @@ class Wipe:
                 refused.add(wiping.stroke)
             return outcome
 
+        sponge = scene.scenario.bodies[held.name]
+        hold = 2 * self._kit.robot.gripper.pad_friction * sponge.friction * grip_force(sponge)
         strokes = list(strokes_for(place, action.args[0]))
         samples = (
             Wiping(stroke, pressing)
-            for pressing in in_order(pressings(self._kit.contact), hints)
+            for pressing in in_order(pressings(self._kit.contact, hold), hints)
             for stroke in strokes
             if stroke not in refused
         )
@@ -156,7 +166,7 @@ class Wipe:
         held = scene.held
         assert held is not None
         stroke = wiping.stroke
-        if not place.taken(stroke)[place.crumbs.names.index(action.args[0])]:
+        if not place.taken(stroke, surely=False)[place.crumbs.names.index(action.args[0])]:
             return Unfit("the crumb does not lie before the stroke")
         if place.comes_down_on(stroke):
             return Unfit("the sponge would come down on a crumb")

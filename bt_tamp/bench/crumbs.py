@@ -29,11 +29,12 @@ APART = 0.002
 
 PAN = "dustpan"
 SPONGE = "sponge"
-TOP, PLATE = 0.05, 0.1
+TOP, PLATE = 0.05, 0.14
 """Metres: the plate reaches below the dustpan's floor, so that nothing slides back out under the table."""
 
-PAN_SIZE = (0.28, 0.15, 0.055)
-"""Metres along the table's edge, away from it, and up; its rims lie 3 cm below the table's top."""
+PAN_SIZE = (0.28, 0.15, 0.09)
+"""Metres along the table's edge, away from it, and up: twelve cubes of 3 cm pile up three deep below the edge over
+which they fall."""
 
 RIMS_BELOW = 0.03
 HOME = np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 80.0, 0.0])

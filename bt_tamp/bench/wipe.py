@@ -42,8 +42,8 @@ def measure(layouts: Sequence[Layout], done: Callable[["WipeResult"], None]) -> 
 class WipeResult:
     """What became of one layout: how many crumbs there were, which don't lie in the dustpan, how many strokes it took.
 
-    pressed_s: simulated seconds from touchdown's beginning to the end of the strokes, pressed_cpu_s the seconds of CPU that
-    they took. peak_n: largest measured contact force. reason: why not all are in the dustpan, empty if they are.
+    pressed_s: simulated seconds from touchdown's beginning to the end of the strokes, pressed_cpu_s the CPU seconds
+    that took. peak_n: largest measured contact force. reason: why not all are in the dustpan, empty if they are.
     """
 
     layout: Layout
