@@ -44,7 +44,7 @@ LEFT_OVER = 0.3
 MAX_TIPS = 8
 """Ways to press that are tried for one end pose."""
 
-GRASP_BUDGET = Budget(tries=5)
+GRASP_BUDGET = Budget()
 DISCOURAGED = 0.1
 """Metres of way that an edge's every failure counts for, in choosing among edges."""
 

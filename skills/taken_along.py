@@ -25,6 +25,9 @@ SLIP = 0.004
 MOST_SLIP = 0.035
 """Metres that they may slip in all: the object would end too far from where it was meant to."""
 
+MOST_RAISES = 2
+"""How often one drag is pressed harder: each time costs about a centimetre of the hand's reserve."""
+
 BRAKING = 0.1
 """Seconds in which the hand comes to rest where it slips."""
 
@@ -55,9 +58,11 @@ class Tow(Slide):
         self._rest: Trajectory | None = None
         self._resume_at = 0.0
         self._is_stopping = False
-        self._p_WO_end = self._predict(scene, refinement).poses[name].translation
-        way = self._p_WO_end - scene.poses[name].translation
-        self._along = way / max(float(np.linalg.norm(way)), 1e-9)
+        self._p_WO_end: np.ndarray | None = None
+        if name in scene.poses:
+            self._p_WO_end = self._predict(scene, refinement).poses[name].translation
+            way = self._p_WO_end - scene.poses[name].translation
+            self._along = way / max(float(np.linalg.norm(way)), 1e-9)
         super().begin()
 
     @property
@@ -99,7 +104,9 @@ class Tow(Slide):
 
     def _has_come(self) -> bool:
         """Will the object be where it was to be when the hand has come to rest?"""
-        X_WO = self._context.scene.poses[self._run.action.args[0]]
+        X_WO = self._context.scene.poses.get(self._run.action.args[0])
+        if X_WO is None or self._p_WO_end is None:
+            return False
         return float((self._p_WO_end - X_WO.translation) @ self._along) <= self.pressing.speed * BRAKING / 2
 
     def _braking(self) -> tuple[Trajectory, float]:
@@ -145,6 +152,7 @@ class TakenAlong(Behaviour):
     def _forget(self) -> None:
         self._began: np.ndarray | None = None
         self._forgiven = 0.0
+        self._raises = 0
 
     def terminate(self, new_status: Status) -> None:
         if new_status == Status.INVALID:
@@ -153,6 +161,8 @@ class TakenAlong(Behaviour):
     def update(self) -> Status:
         if self._tow.status != Status.RUNNING:
             self._forget()
+            return Status.SUCCESS
+        if self._run.action.args[0] not in self._context.scene.poses:
             return Status.SUCCESS
         tip = self._tip()
         if self._began is None:
@@ -164,6 +174,9 @@ class TakenAlong(Behaviour):
             return self._slipped(f"the fingertips slipped {slip * 1000:.0f} mm on it")
         if slip - self._forgiven > SLIP:
             self._forgiven = slip
+            if self._raises == MOST_RAISES:
+                return self._slipped(f"the fingertips slip on it, even at {self._tow.pressing.force:.0f} N")
+            self._raises += 1
             if not self._tow.press_harder():
                 return self._slipped("the fingertips slip on it at the greatest force allowed")
         return Status.SUCCESS

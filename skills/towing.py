@@ -90,14 +90,14 @@ def needed_force(body: Body, table: Table, pad_friction: float) -> float | None:
 
 def pressings(needed: float, stiffness: tuple[float, ...]) -> list[Pressing]:
     """Ways to press when friction asks for `needed` N: first the force believed to be enough, then ever harder ones,
-    then slowly."""
+    then slowly and more stiffly led."""
     found: list[Pressing] = []
     force = min(max(LEAST_FORCE, FORCE_FACTOR * needed), GREATEST_FORCE)
     following: Pressing | None = Pressing(force, SPEED, stiffness)
     while following is not None:
         found.append(following)
         following = harder(following)
-    return [*found, found[0].varied(speed=0.5), found[-1].varied(speed=0.5)]
+    return [*found, found[0].varied(speed=0.5), found[-1].varied(speed=0.5, stiffness=2.0)]
 
 
 def harder(pressing: Pressing) -> Pressing | None:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table as Rows
 
 from bt_tamp.bench.boxes import BOX, COUNT, TOP, Layout, layouts
 from bt_tamp.bench.checks import Check
@@ -147,35 +146,34 @@ def _edge(table: Table, p_WO: np.ndarray | None) -> str:
     return min(gaps, key=lambda name: gaps[name])
 
 
+COLUMNS = (
+    ("table at", 8, lambda r: f"{r.layout.azimuth}°"),
+    ("size cm", 16, lambda r: "×".join(f"{100 * s:.1f}" for s in r.layout.size)),
+    ("kg", 6, lambda r: f"{r.layout.mass:.2f}"),
+    ("friction", 9, lambda r: f"{r.layout.friction:.2f}"),
+    ("yaw", 7, lambda r: f"{np.degrees(r.layout.yaw):.0f}°"),
+    ("edge", 5, lambda r: r.edge),
+    ("drags", 6, lambda r: str(r.drags)),
+    ("N", 4, lambda r: f"{r.force:.0f}"),
+    ("peak N", 7, lambda r: f"{r.peak_n:.0f}"),
+    ("held", 5, lambda r: "yes" if r.is_held else "NO"),
+)
+"""Heading, width and text of each column."""
+
+
 def print_results(console: Console, results: Sequence[DragResult]) -> None:
     """One row a box, then why some aren't held and what went wrong on the way."""
-    table = Rows(title="boxes dragged to an edge and picked there", title_justify="left")
-    for heading in ("table at", "size cm", "kg", "friction", "yaw", "edge", "drags", "N", "peak N", "robot s", "held"):
-        table.add_column(heading, justify="left" if heading in ("size cm", "edge", "held") else "right")
-    for r in results:
-        layout = r.layout
-        table.add_row(
-            f"{layout.azimuth}°",
-            " × ".join(f"{100 * s:.1f}" for s in layout.size),
-            f"{layout.mass:.2f}",
-            f"{layout.friction:.2f}",
-            f"{np.degrees(layout.yaw):.0f}°",
-            r.edge,
-            str(r.drags),
-            f"{r.force:.0f}",
-            f"{r.peak_n:.0f}",
-            f"{r.robot_s:.0f}",
-            "yes" if r.is_held else "NO",
-        )
-    console.print(table)
-    edges = Counter(r.edge for r in results)
-    console.print("edges: " + ", ".join(f"{edge} {count}" for edge, count in sorted(edges.items())), highlight=False)
-    for title, lines in (
-        ("not held", [f"{index}: {r.reason}" for index, r in enumerate(results, 1) if not r.is_held]),
-        ("failed on the way", [f"{i}: {text}" for i, r in enumerate(results, 1) for text in r.failures]),
+    lines = ["    " + "".join(f"{name:>{width}}" for name, width, _ in COLUMNS)]
+    for number, result in enumerate(results, 1):
+        lines.append(f"{number:>3} " + "".join(f"{text(result):>{width}}" for _, width, text in COLUMNS))
+    edges = Counter(result.edge for result in results)
+    lines.append("edges: " + ", ".join(f"{edge} {count}" for edge, count in sorted(edges.items())))
+    for title, said in (
+        ("not held", [f"{number}: {r.reason}" for number, r in enumerate(results, 1) if not r.is_held]),
+        ("failed on the way", [f"{number}: {text}" for number, r in enumerate(results, 1) for text in r.failures]),
     ):
-        if lines:
-            console.print("\n".join((title, *lines)), highlight=False, markup=False, soft_wrap=True)
+        lines += [title, *said] if said else []
+    console.print("\n".join(lines), highlight=False, markup=False, soft_wrap=True)
 
 
 def acceptance(results: Sequence[DragResult]) -> list[Check]:

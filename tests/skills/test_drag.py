@@ -190,6 +190,7 @@ def test_where_the_first_force_fails_a_greater_one_works_and_is_kept_for_the_nex
     bench.context.refine = refine
     assert bench.do("drag(book, table)") is Status.FAILURE
     assert bench.context.failure is not None
+    assert bench.context.failure.kind == "DragSlipped"
     planner.search.learn(bench.context.failure, bench.scene)
     bench.context.failure = None
     assert bench.do("drag(book, table)") is Status.SUCCESS
