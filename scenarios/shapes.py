@@ -52,6 +52,17 @@ def bounding_radius(shape: Shape) -> float:
             return radius
 
 
+def inscribed_radius(shape: Shape) -> float:
+    """Radius in metres of the largest sphere about the origin inside the shape."""
+    match shape:
+        case Box(size):
+            return min(size) / 2
+        case Cylinder(radius, height):
+            return min(radius, height / 2)
+        case Sphere(radius):
+            return radius
+
+
 def volume(shape: Shape) -> float:
     """Volume in cubic metres."""
     match shape:

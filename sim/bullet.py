@@ -36,6 +36,10 @@ CONTACT_BREAKING = 0.002
 """Metres after which a contact point is given up. With Bullet's own 0.02 stale points under the pads let a book
 turn in the hand by 3° a second while everything stands still."""
 
+ROLLING_RESISTANCE = 0.001
+"""Metres, before it is multiplied by the other body's friction: lever of the force that resists rolling and turning on
+the spot, as of things on wood. Without it a glass on its rim or a ball never come to rest."""
+
 PEDESTAL_SIZE = 0.24
 FLOOR_FRICTION = 0.8
 GEAR_STIFFNESS = 2e4
@@ -268,8 +272,8 @@ class BulletPlant:
             body,
             -1,
             lateralFriction=friction,
-            rollingFriction=0.0,
-            spinningFriction=0.0,
+            rollingFriction=ROLLING_RESISTANCE,
+            spinningFriction=ROLLING_RESISTANCE,
             restitution=0.0,
             linearDamping=0.0,
             angularDamping=0.0,

@@ -16,7 +16,7 @@ from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
 from skills.pick import Pick
 from skills.pressing import Pressing, in_order
-from skills.skill import Toolkit, Unfit, refine_by_sampling
+from skills.skill import Toolkit, Unfit, beyond_reach, refine_by_sampling
 from skills.towing import (
     EDGE_MARGIN,
     Tips,
@@ -134,6 +134,9 @@ class Drag:
         self, action: GroundAction, scene: SceneState, rng: np.random.Generator, budget: Budget, hints: Hints
     ) -> Refinement | RefinementFailure:
         body = scene.scenario.bodies[action.args[0]]
+        beyond = beyond_reach(self._kit, action, scene)
+        if beyond is not None:
+            return beyond
         pressings = ways_of_pressing(self._kit, action, scene)
         if isinstance(pressings, RefinementFailure):
             return pressings

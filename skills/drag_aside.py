@@ -15,7 +15,7 @@ from scenarios.shapes import extents
 from sim.scene import Held, SceneState
 from skills.context import ActionRun, SkillContext
 from skills.pressing import Pressing, in_order
-from skills.skill import Toolkit, Unfit, hand_would_hit, refine_by_sampling
+from skills.skill import Toolkit, Unfit, beyond_reach, hand_would_hit, refine_by_sampling
 from skills.towing import (
     Tips,
     footprint,
@@ -76,6 +76,9 @@ class DragAside:
     def refine(
         self, action: GroundAction, scene: SceneState, rng: np.random.Generator, budget: Budget, hints: Hints
     ) -> Refinement | RefinementFailure:
+        beyond = beyond_reach(self._kit, action, scene)
+        if beyond is not None:
+            return beyond
         pressings = ways_of_pressing(self._kit, action, scene)
         if isinstance(pressings, RefinementFailure):
             return pressings

@@ -3,6 +3,7 @@
 import resource
 import time
 import traceback
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +19,7 @@ from bt_tamp.export.snapshot import Results
 from bt_tamp.options import RunOptions
 from bt_tamp.report.recorder import RunRecorder
 from bt_tamp.report.result import Outcome, RunResult
+from bt_tamp.report.sentences import counted
 from bt_tamp.report.signals import Contact, Reference
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
@@ -25,6 +27,9 @@ from sim.plant import Command
 
 SAMPLE_EVERY = 5
 """Control ticks between two samples of the signals and two looks at the true contacts: 100 Hz."""
+
+REST_PATIENCE = 30.0
+"""Simulated seconds that things may go on moving once the goal's literals hold."""
 
 MAX_REPLANS = 25
 MAX_ACTIONS = 200
@@ -39,6 +44,8 @@ class Tally:
     energy_j: float = 0.0
     peak_force_n: float = 0.0
     learned: dict[str, None] = field(default_factory=dict)
+    failed: Counter[str] = field(default_factory=Counter)
+    reasons: dict[str, str] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
 
 
@@ -69,6 +76,9 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
     def report(kind: str, **data: Any) -> None:
         if kind == "learned":
             tally.learned[data["sentence"]] = None
+        if kind == "action_failed":
+            tally.failed[data["action"]] += 1
+            tally.reasons[data["action"]] = data["reason"]
         _report(recorder, tally.t, kind, data, machine.planner.thinking.rounds)
 
     def tree_changed(why: str) -> None:
@@ -110,7 +120,7 @@ def _run(
         if tick % TREE_EVERY == 0:
             context.scene = machine.belief.update(observation, context.grip.is_closing)
             tree.tick()
-            ending = _ending(machine, options)
+            ending = _ending(machine, options, tally)
             if ending:
                 return ending
         tau = context.controller.update(observation)
@@ -149,20 +159,31 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
             )
 
 
-def _ending(machine: Machine, options: RunOptions) -> Ending | None:
+def _ending(machine: Machine, options: RunOptions, tally: Tally) -> Ending | None:
     verdict = machine.planner.thinking.verdict
     if machine.mission.goal.status == Status.SUCCESS:
         machine.context.report("goal_reached")
         return Ending("goal_reached", "every literal of the goal holds")
     if verdict is not None:
         return Ending("proven_infeasible" if verdict.verdict == "proven" else "no_plan", verdict.reason)
+    restless = machine.mission.goal.restless
+    if restless is not None and machine.context.observation.t - restless[0] > REST_PATIENCE:
+        return Ending("gave_up", f"{', '.join(restless[1])} did not come to rest within {REST_PATIENCE:g} s")
     if machine.planner.thinking.plans > MAX_REPLANS:
-        return Ending("gave_up", f"{MAX_REPLANS} plans were made and none led to the goal")
+        return Ending("gave_up", f"{MAX_REPLANS} plans were made and none led to the goal{_most_often(tally)}")
     if len(machine.agenda.executed) > MAX_ACTIONS:
         return Ending("gave_up", f"{MAX_ACTIONS} actions were carried out and the goal still does not hold")
     if machine.context.observation.t > options.max_sim_time:
         return Ending("gave_up", f"{options.max_sim_time:g} s of simulated time have passed")
     return None
+
+
+def _most_often(tally: Tally) -> str:
+    """Which action failed most often in execution, and why it did last."""
+    if not tally.failed:
+        return ""
+    (action, times), *_ = tally.failed.most_common(1)
+    return f"; {action} failed {counted(times, 'time')}, at last because {tally.reasons[action]}"
 
 
 def _result(machine: Machine, scenario: Scenario, ending: Ending, audits: Audits, tally: Tally) -> RunResult:
