@@ -85,8 +85,9 @@ class ArmController:
 
     What it follows is set by `follow` and `hold`, which take effect at the next `update`. It holds
     at first. Losing contact while pressed, it holds and says so in `contact_lost`. When a safety limit is about
-    to be passed or something unexpected pushes, it comes to rest, holds and says why in `stopped`, until it is
-    told what to follow next. `lap` is called with the name of each part of an update that has just been done.
+    to be passed or something unexpected pushes, it comes to rest, holds and says why in `stopped`, until that is
+    acknowledged or it is told what to follow next. `lap` is called with the name of each part of an update that has
+    just been done.
     """
 
     def __init__(
@@ -136,6 +137,13 @@ class ArmController:
         if self._pending is None and self._reference is None:
             return
         self._pending, self._hold_pending = None, True
+
+    def acknowledge(self) -> None:
+        """Take note of a stop: hold stiffly again, from where the arm is now."""
+        if self.stopped is not None:
+            self.stopped = self._unexplained = None
+            self._guard.reset()
+            self._hold_pending = True
 
     def set_payload(self, mass: float, com_G: np.ndarray, inertia_G: np.ndarray) -> None:
         """A rigid load is in the hand: mass in kg, centre com_G (3,) in m, inertia (3,3) in kg m² about it, in G."""
