@@ -38,6 +38,9 @@ began to rock and crept up in the hand."""
 CHORD = np.radians(7.5)
 """Turn between two poses on an arc: below the 10° at which a line stops at its corners."""
 
+ROUNDING = 1e-9
+"""Metres by which legs overlap, lest a point where they join be missed."""
+
 
 @dataclass(frozen=True)
 class Stroke:
@@ -93,7 +96,7 @@ class Stroke:
         when, where = np.full(len(points), np.inf), np.zeros(len(points))
 
         def note(ahead: np.ndarray, lateral: np.ndarray, passed: float, begin: float, end: float) -> None:
-            hit = (ahead >= begin) & (ahead <= end) & (np.abs(lateral) <= reach)
+            hit = (ahead >= begin - ROUNDING) & (ahead <= end + ROUNDING) & (np.abs(lateral) <= reach)
             when[hit], where[hit] = passed + ahead[hit], lateral[hit]
 
         if not self.turn:
