@@ -118,7 +118,9 @@ class Tow(Slide):
     def _press_along(self, trajectory: Trajectory) -> None:
         pressing, context = self.pressing, self._context
         stiffness = np.array(pressing.stiffness)
-        context.controller.follow(Reference(trajectory, context.contact_mode, stiffness, pressing.force))
+        context.controller.follow(
+            Reference(trajectory, context.contact_mode, stiffness, pressing.force, damping=pressing.damping)
+        )
 
 
 class KeepPressing(Behaviour):

@@ -97,7 +97,7 @@ def pressings(needed: float, stiffness: tuple[float, ...]) -> list[Pressing]:
     while following is not None:
         found.append(following)
         following = harder(following)
-    return [*found, found[0].varied(speed=0.5), found[-1].varied(speed=0.5, stiffness=2.0)]
+    return [*found, found[0].varied(speed=0.5), found[-1].varied(speed=0.5, stiffness=2.0, damping=1.5)]
 
 
 def harder(pressing: Pressing) -> Pressing | None:

@@ -70,7 +70,7 @@ def pressings(contact: ContactSettings, hold: float) -> list[Pressing]:
         usual.varied(force=0.5, speed=0.5),
         usual.varied(force=harder, speed=0.5),
         usual.varied(speed=0.3),
-        usual.varied(stiffness=2.0, speed=0.5),
+        usual.varied(stiffness=2.0, damping=1.5, speed=0.5),
     ]
 
 

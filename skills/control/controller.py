@@ -365,11 +365,11 @@ class ArmController:
             wrench[:3] += normal * (force - normal @ wrench[:3])
             landed = smooth_step(self._loop.time / LANDING) if reference.until_contact else 1.0
             damping = LANDING_DAMPING + (SINK_DAMPING - LANDING_DAMPING) * landed
-            return [HybridTask(target, reference.R_WC, damping), posture], wrench, limits
+            return [HybridTask(target, reference.R_WC, reference.damping * damping), posture], wrench, limits
         assert reference.stiffness is not None
         if self._pressed:
             target = self._pressed_target(target, reference)
-        return [PoseTask(target, reference.stiffness, self._period), posture], _NO_WRENCH, limits
+        return [PoseTask(target, reference.stiffness, self._period, reference.damping), posture], _NO_WRENCH, limits
 
     def _pressed_target(self, target: Target, reference: Reference) -> Target:
         """The target in the plane through the touched point, below it by force over stiffness."""

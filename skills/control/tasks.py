@@ -82,14 +82,16 @@ class PostureTask:
 
 
 class PoseTask:
-    """Impedance of the tool towards a target: Λ (ẍ − ẍ_d) + D ė + K e = F_ext, each mode critically damped.
+    """Impedance of the tool towards a target: Λ (ẍ − ẍ_d) + D ė + K e = F_ext, each mode critically damped,
+    or with `ratio` times as much.
 
     stiffness (6,): N/m and Nm/rad along and about W's axes, all positive. External force is not
     compensated, so a static force F displaces the tool by F/K. period: of the control ticks, in s.
     """
 
-    def __init__(self, target: Target, stiffness: np.ndarray, period: float) -> None:
+    def __init__(self, target: Target, stiffness: np.ndarray, period: float, ratio: float = 1.0) -> None:
         self._target = target
+        self._ratio = ratio
         self._root = np.sqrt(stiffness)
         self._period = period
 
@@ -104,7 +106,7 @@ class PoseTask:
         frequencies = np.sqrt(np.maximum(squares, 0.0))
         spring = modes.T @ (root * pose_error(target, state))
         damper = modes.T @ (root * (target.V - state.V))
-        damping = frequencies * np.maximum(2.0 - frequencies * self._period / 2, 1.0)
+        damping = self._ratio * frequencies * np.maximum(2.0 - frequencies * self._period / 2, 1.0)
         pull = modes @ (squares * spring + damping * damper)
         return Rows(state.J, target.A + pull / root - state.drift)
 
