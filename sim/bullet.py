@@ -5,6 +5,7 @@ couples the two fingers, as the gear does in the real gripper. Two frictions com
 """
 
 import tempfile
+import weakref
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -82,6 +83,9 @@ class BulletPlant:
         self.timestep = PHYSICS_STEP
         self._t = 0.0
         self._client = p.connect(p.GUI if window else p.DIRECT)
+        # A plant that nobody closed keeps its engine, 10 MB and more, until the process ends.
+        self._free = weakref.finalize(self, p.disconnect, self._client)
+        self._free.atexit = False
         self._names: dict[int, str] = {}
         p.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         p.setPhysicsEngineParameter(
@@ -97,7 +101,7 @@ class BulletPlant:
 
     def close(self) -> None:
         """Free the engine. The plant can't be used afterwards."""
-        p.disconnect(self._client)
+        self._free()
 
     def observe(self) -> Observation:
         arm = p.getJointStates(self._robot, self._arm_joints, physicsClientId=self._client)
