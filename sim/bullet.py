@@ -38,9 +38,10 @@ CONTACT_BREAKING = 0.002
 turn in the hand by 3° a second while everything stands still."""
 
 ROLLING_RESISTANCE = 0.001
-"""Metres, before it is multiplied by a body's friction: lever of the force with which what stands fast resists rolling
-and turning on the spot, as wood does. Without it a glass on its rim or a ball never come to rest. Bodies have none
-of their own: PyBullet's wrist sensor does not feel the torque that it would put between them and the pads."""
+"""Metres, before it is multiplied by the other body's friction: lever of the force that resists rolling and turning on
+the spot, as of things on wood and of rubber pads on things. Without it a glass on its rim or a ball never come to rest,
+and a soft thing turns between the pads. PyBullet's wrist sensor leaves the torques out that it puts between pads and
+body, about 0.1 Nm: forces are felt rightly, so a load's mass is, but not where its centre lies."""
 
 PEDESTAL_SIZE = 0.24
 FLOOR_FRICTION = 0.8
@@ -277,8 +278,8 @@ class BulletPlant:
             body,
             -1,
             lateralFriction=friction,
-            rollingFriction=0.0 if mass else ROLLING_RESISTANCE,
-            spinningFriction=0.0 if mass else ROLLING_RESISTANCE,
+            rollingFriction=ROLLING_RESISTANCE,
+            spinningFriction=ROLLING_RESISTANCE,
             restitution=0.0,
             linearDamping=0.0,
             angularDamping=0.0,
