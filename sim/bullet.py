@@ -37,11 +37,10 @@ CONTACT_BREAKING = 0.002
 """Metres after which a contact point is given up. With Bullet's own 0.02 stale points under the pads let a book
 turn in the hand by 3° a second while everything stands still."""
 
-ROLLING_RESISTANCE = 0.001
-"""Metres, before it is multiplied by the other body's friction: lever of the force that resists rolling and turning on
-the spot, as of things on wood and of rubber pads on things. Without it a glass on its rim or a ball never come to rest,
-and a soft thing turns between the pads. PyBullet's wrist sensor leaves the torques out that it puts between pads and
-body, about 0.1 Nm: forces are felt rightly, so a load's mass is, but not where its centre lies."""
+RESISTANCE = 0.001
+"""Metres, before it is multiplied by the other body's friction: lever of the force that resists rolling on what stands
+fast, as of things on wood, and turning on the spot, as of things between rubber pads. Without it a glass on its rim or
+a ball never come to rest, and a soft thing turns in the hand."""
 
 PEDESTAL_SIZE = 0.24
 FLOOR_FRICTION = 0.8
@@ -272,14 +271,17 @@ class BulletPlant:
             self._visual_shape(shape, color),
             list(pose[:3]),
             list(pose[3:]),
+            # As a multibody, PyBullet's default, a thing costs several times as much, and what the pads do against its
+            # turning never reaches the wrist sensor.
+            useMaximalCoordinates=True,
             physicsClientId=self._client,
         )
         p.changeDynamics(
             body,
             -1,
             lateralFriction=friction,
-            rollingFriction=ROLLING_RESISTANCE,
-            spinningFriction=ROLLING_RESISTANCE,
+            rollingFriction=RESISTANCE if mass == 0.0 else 0.0,
+            spinningFriction=RESISTANCE,
             restitution=0.0,
             linearDamping=0.0,
             angularDamping=0.0,
