@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -52,15 +52,33 @@ GEAR_DAMPING = 40.0
 """N s/m: damps the 0.1 kg fingers well and is stable at 1 kHz."""
 
 
-@dataclass(frozen=True)
+_NORMAL_FORCE = 9
+
+
+@dataclass(frozen=True, slots=True)
 class Contact:
-    """A true contact point: the two names, position (3,) in W, force (3,) in N on the first, in W."""
+    """A true contact point between two named things, as the engine tells it (`getContactPoints`)."""
 
     first: str
     second: str
-    position: np.ndarray
-    force: np.ndarray
-    normal_force: float
+    point: tuple[Any, ...]
+
+    @property
+    def normal_force(self) -> float:
+        """N, pressing is positive."""
+        return self.point[_NORMAL_FORCE]
+
+    @property
+    def position(self) -> np.ndarray:
+        """(3,) in W, on the second."""
+        return np.array(self.point[6])
+
+    @property
+    def force(self) -> np.ndarray:
+        """(3,) in N on the first, in W, friction included."""
+        normal, across, along = self.point[7], self.point[11], self.point[13]
+        forces = self.point[_NORMAL_FORCE], self.point[10], self.point[12]
+        return np.array(forces) @ np.array((normal, across, along))
 
 
 @contextmanager
@@ -130,11 +148,12 @@ class BulletPlant:
         )
 
     def apply(self, command: Command) -> None:
-        if not np.all(np.isfinite(command.tau)):
+        if not np.isfinite(command.tau).all():
             raise ValueError(f"torque command must be finite, got {command.tau}")
-        self._tau = np.clip(command.tau, -self._tau_max, self._tau_max)
-        speed = float(np.clip(command.grip.speed, -self._max_grip_speed, self._max_grip_speed)) / 2
-        force = float(np.clip(command.grip.force, 0.0, self._max_grip_force))
+        self._tau = np.minimum(np.maximum(command.tau, -self._tau_max), self._tau_max)
+        self._torques = self._tau.tolist()
+        speed = min(max(float(command.grip.speed), -self._max_grip_speed), self._max_grip_speed) / 2
+        force = min(max(float(command.grip.force), 0.0), self._max_grip_force)
         p.setJointMotorControlArray(
             self._robot,
             self._finger_joints,
@@ -152,7 +171,7 @@ class BulletPlant:
             self._robot,
             self._arm_joints + self._finger_joints,
             p.TORQUE_CONTROL,
-            forces=[*self._tau, gear, -gear],
+            forces=[*self._torques, gear, -gear],
             physicsClientId=self._client,
         )
         self.lap("drive")
@@ -162,16 +181,11 @@ class BulletPlant:
 
     def contacts(self) -> list[Contact]:
         """True contacts that carry force, for reports and benchmarks; the executive never reads them."""
-        found = []
-        for point in p.getContactPoints(physicsClientId=self._client):
-            normal_force = point[9]
-            if normal_force <= 0.0:
-                continue
-            normal = np.array(point[7])
-            friction = point[10] * np.array(point[11]) + point[12] * np.array(point[13])
-            first, second = self._name(point[1], point[3]), self._name(point[2], point[4])
-            found.append(Contact(first, second, np.array(point[6]), normal * normal_force + friction, normal_force))
-        return found
+        return [
+            Contact(self._name(point[1], point[3]), self._name(point[2], point[4]), point)
+            for point in p.getContactPoints(physicsClientId=self._client)
+            if point[_NORMAL_FORCE] > 0.0
+        ]
 
     def pressed(self, first: str, second: str) -> float:
         """True normal force in N between two things, for reports and benchmarks. Raises ValueError for a name that

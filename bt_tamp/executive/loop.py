@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from py_trees.common import Status
-from py_trees.trees import BehaviourTree
 
 from bt_tamp.errors import one_line_of
 from bt_tamp.executive.audit import ContactAudit
@@ -56,6 +55,10 @@ class Audits:
     contacts: ContactAudit
     forces: ForceAudit
 
+    @staticmethod
+    def of(machine: Machine) -> "Audits":
+        return Audits(ContactAudit(machine.robot), ForceAudit(machine.robot))
+
 
 @dataclass(frozen=True)
 class Ending:
@@ -85,7 +88,7 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
         recorder.tree(machine.mission.root, why)
 
     machine = build(scenario, options, report, tree_changed)
-    audits = Audits(ContactAudit(machine.robot, scenario), ForceAudit(machine.robot))
+    audits = Audits.of(machine)
     report("run_started", scene=scenario.name, seed=scenario.seed)
     try:
         ending = _run(machine, options, recorder, audits, tally)
@@ -109,36 +112,51 @@ def _run(
     audits: Audits,
     tally: Tally,
 ) -> Ending:
-    plant, context = machine.plant, machine.context
-    tree = BehaviourTree(machine.mission.root)
-    tree.add_visitor(tally.results)
-    tick = 0
+    n = 0
     while True:
-        observation = plant.observe()
-        tally.t = observation.t
-        context.observation = observation
-        if tick % TREE_EVERY == 0:
-            context.scene = machine.belief.update(observation, context.grip.is_closing)
-            tree.tick()
+        look(machine, tally, n)
+        if n % TREE_EVERY == 0:
             ending = _ending(machine, options, tally)
             if ending:
                 return ending
-        tau = context.controller.update(observation)
-        plant.apply(Command(tau, context.grip.command(observation)))
-        _account(machine, recorder, audits, tally, tick)
-        for _ in range(CONTROL_EVERY):
-            plant.step()
-        tick += 1
+        act(machine, recorder, audits, tally, n)
+        n += 1
 
 
-def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally, tick: int) -> None:
+def look(machine: Machine, tally: Tally, n: int) -> None:
+    """First half of control tick n: observe, and tick the tree when it is due."""
+    context = machine.context
+    context.observation = machine.plant.observe()
+    tally.t = context.observation.t
+    machine.plant.lap("observe")
+    if n % TREE_EVERY == 0:
+        context.scene = machine.belief.update(context.observation, context.grip.is_closing)
+        # BehaviourTree.tick would walk through the whole tree once more, for visitors of a kind that is not here.
+        for node in machine.mission.root.tick():
+            node.visit(tally.results)
+        machine.plant.lap("tree")
+
+
+def act(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally, n: int) -> None:
+    """Second half of control tick n: control, record, and let the world go on."""
+    plant, context = machine.plant, machine.context
+    tau = context.controller.update(context.observation)
+    plant.apply(Command(tau, context.grip.command(context.observation)))
+    plant.lap("apply")
+    _account(machine, recorder, audits, tally, n)
+    plant.lap("record")
+    for _ in range(CONTROL_EVERY):
+        plant.step()
+
+
+def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally, n: int) -> None:
     context = machine.context
     controller, observation = context.controller, context.observation
     force = controller.contact_force if controller.contact else 0.0
     tally.peak_force_n = max(tally.peak_force_n, force)
-    power = np.abs(observation.tau * observation.v).sum()
-    tally.energy_j += float(power) * CONTROL_EVERY * machine.plant.timestep
-    if tick % SAMPLE_EVERY == 0:
+    power = float(np.abs(observation.tau) @ np.abs(observation.v))
+    tally.energy_j += power * CONTROL_EVERY * machine.plant.timestep
+    if n % SAMPLE_EVERY == 0:
         reference = controller.reference
         wanted = reference.force if reference else 0.0
         q_ref = reference.trajectory.at(controller.time_in_reference)[0] if reference else observation.q
@@ -151,11 +169,7 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
         if recorder.contacts_due(observation.t):
             recorder.contacts(
                 observation.t,
-                [
-                    Contact(c.first, c.second, c.position, c.force)
-                    for c in contacts
-                    if audits.contacts.involves_robot(c, context)
-                ],
+                [Contact(c.first, c.second, c.position, c.force) for c in audits.contacts.of_robot(contacts, context)],
             )
 
 
