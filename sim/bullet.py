@@ -123,9 +123,9 @@ class BulletPlant:
         self._free()
 
     def observe(self) -> Observation:
-        arm = p.getJointStates(self._robot, self._arm_joints, physicsClientId=self._client)
-        fingers = p.getJointStates(self._robot, self._finger_joints, physicsClientId=self._client)
-        sensor = p.getJointState(self._robot, self._sensor_joint, physicsClientId=self._client)[2]
+        states = p.getJointStates(self._robot, self._joints, physicsClientId=self._client)
+        q, v, reactions, drives = zip(*states, strict=True)
+        sensor = reactions[-1]
         # PyBullet reports the joint's reaction about the child link's centre of mass, on the child.
         force = -np.array(sensor[:3])
         poses, velocities = {}, {}
@@ -136,12 +136,12 @@ class BulletPlant:
             velocities[name] = linear + angular
         return Observation(
             t=self._t,
-            q=np.array([state[0] for state in arm]),
-            v=np.array([state[1] for state in arm]),
+            q=np.array(q[:7]),
+            v=np.array(v[:7]),
             tau=self._tau.copy(),
-            opening=fingers[0][0] + fingers[1][0],
-            opening_velocity=fingers[0][1] + fingers[1][1],
-            grip_force=(abs(fingers[0][3]) + abs(fingers[1][3])) / 2,
+            opening=q[7] + q[8],
+            opening_velocity=v[7] + v[8],
+            grip_force=(abs(drives[7]) + abs(drives[8])) / 2,
             wrist=Wrench(force, self._lever @ force - np.array(sensor[3:])),
             poses=_Converted(poses, _pose),
             velocities=_Converted(velocities, np.array),
@@ -369,6 +369,7 @@ class BulletPlant:
         self._arm_joints = [index[f"joint_{i}"] for i in range(1, 8)]
         self._finger_joints = [index["finger_left_slide"], index["finger_right_slide"]]
         self._sensor_joint = index["wrist_sensor"]
+        self._joints = [*self._arm_joints, *self._finger_joints, self._sensor_joint]
         self._tcp_link = index["tcp_mount"]
         hand = p.getDynamicsInfo(self._robot, self._sensor_joint, physicsClientId=self._client)
         self._lever = pin.skew(np.array(hand[3]))
