@@ -83,11 +83,6 @@ class Body:
     contact_stiffness: float | None = None
     contact_damping: float | None = None
 
-    @property
-    def is_soft(self) -> bool:
-        """Does it give way where it touches: are contact_stiffness (N/m) and contact_damping (N s/m) given?"""
-        return self.contact_stiffness is not None and self.contact_damping is not None
-
 
 @dataclass(frozen=True)
 class Scenario:

@@ -37,10 +37,14 @@ CONTACT_BREAKING = 0.002
 """Metres after which a contact point is given up. With Bullet's own 0.02 stale points under the pads let a book
 turn in the hand by 3° a second while everything stands still."""
 
-RESISTANCE = 0.001
-"""Metres, before it is multiplied by the other body's friction: lever of the force that resists rolling on what stands
-fast, as of things on wood, and turning on the spot, as of things between rubber pads. Without it a glass on its rim or
-a ball never come to rest, and a soft thing turns in the hand."""
+ROTATION_DAMPING = 2.0
+"""1/s at which a thing's turning dies away: without it a glass on its rim or a ball never come to rest. Bullet's own
+rolling friction does it too, but doubles the cost of every contact."""
+
+PAD_RESISTANCE = 0.001
+"""Metres, before it is multiplied by the friction of what is held: lever of the force with which the pads resist
+turning on the spot, as rubber does. Without it a soft thing turns in the hand. PyBullet's wrist sensor leaves these
+torques out, about 0.1 Nm: forces are felt rightly, so a load's mass is, but not where its centre lies."""
 
 PEDESTAL_SIZE = 0.24
 FLOOR_FRICTION = 0.8
@@ -276,18 +280,8 @@ class BulletPlant:
                 return p.createVisualShape(p.GEOM_SPHERE, radius=radius, rgbaColor=color, physicsClientId=self._client)
 
     def _add(
-        self,
-        name: str,
-        shape: Shape,
-        X_WO: SE3,
-        friction: float,
-        mass: float,
-        color: tuple[float, float, float, float],
-        is_soft: bool = False,
+        self, name: str, shape: Shape, X_WO: SE3, friction: float, mass: float, color: tuple[float, float, float, float]
     ) -> int:
-        """A thing, as a rigid body to the engine: as a multibody, its default, it costs several times as much, and what
-        the pads do against its turning never reaches the wrist sensor. But a soft rigid body that is pressed on another
-        rings when it slides, by 5 % of the force; as a multibody it doesn't."""
         pose = pin.SE3ToXYZQUAT(X_WO)
         body = p.createMultiBody(
             mass,
@@ -295,18 +289,17 @@ class BulletPlant:
             self._visual_shape(shape, color),
             list(pose[:3]),
             list(pose[3:]),
-            useMaximalCoordinates=not is_soft,
+            # Between bodies in maximal coordinates, which cost less, Bullet resists sliding in one direction only.
+            useMaximalCoordinates=False,
             physicsClientId=self._client,
         )
         p.changeDynamics(
             body,
             -1,
             lateralFriction=friction,
-            rollingFriction=RESISTANCE if mass == 0.0 else 0.0,
-            spinningFriction=RESISTANCE,
             restitution=0.0,
             linearDamping=0.0,
-            angularDamping=0.0,
+            angularDamping=ROTATION_DAMPING,
             activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING,
             physicsClientId=self._client,
         )
@@ -340,8 +333,8 @@ class BulletPlant:
 
     def _add_body(self, name: str) -> int:
         body = self.scenario.bodies[name]
-        identity = self._add(name, body.shape, body.X_WO, body.friction, body.mass, body.color, body.is_soft)
-        if body.is_soft:
+        identity = self._add(name, body.shape, body.X_WO, body.friction, body.mass, body.color)
+        if body.contact_stiffness is not None and body.contact_damping is not None:
             p.changeDynamics(
                 identity,
                 -1,
@@ -384,7 +377,11 @@ class BulletPlant:
             )
         for finger in self._finger_joints:
             p.changeDynamics(
-                self._robot, finger, lateralFriction=robot.gripper.pad_friction, physicsClientId=self._client
+                self._robot,
+                finger,
+                lateralFriction=robot.gripper.pad_friction,
+                spinningFriction=PAD_RESISTANCE,
+                physicsClientId=self._client,
             )
         p.setJointMotorControlArray(
             self._robot, self._arm_joints, p.VELOCITY_CONTROL, forces=[0.0] * 7, physicsClientId=self._client
