@@ -41,10 +41,11 @@ ROTATION_DAMPING = 2.0
 """1/s at which a thing's turning dies away: without it a glass on its rim or a ball never come to rest. Bullet's own
 rolling friction does it too, but doubles the cost of every contact."""
 
-PAD_RESISTANCE = 0.001
+PAD_RESISTANCE = 0.003
 """Metres, before it is multiplied by the friction of what is held: lever of the force with which the pads resist
-turning on the spot, as rubber does. Without it a soft thing turns in the hand. PyBullet's wrist sensor leaves these
-torques out, about 0.1 Nm: forces are felt rightly, so a load's mass is, but not where its centre lies."""
+turning on the spot, that of a round patch 9 mm across (two thirds of its radius). A point contact resists nothing, and
+what is held would swing. PyBullet's wrist sensor leaves these torques out, some 0.1 Nm: forces are felt rightly, so a
+load's mass is, but not where its centre lies."""
 
 PEDESTAL_SIZE = 0.24
 FLOOR_FRICTION = 0.8
