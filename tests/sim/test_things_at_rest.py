@@ -15,6 +15,7 @@ from sim.plant import Command, GripCommand
 from sim.robot import RobotModel
 
 SIDE = 0.06
+CUBE = Box((SIDE, SIDE, SIDE))
 
 
 @pytest.fixture
@@ -23,9 +24,7 @@ def stack():
     scenario = load_scenario("fig1", 0)
     top = scenario.table.X_WT.act(np.array([0.0, 0.0, scenario.table.size[2] / 2]))
     bodies = {
-        name: Body(
-            name, Box((SIDE,) * 3), 0.2, 0.5, (1.0, 0.0, 0.0, 1.0), SE3(np.eye(3), top + np.array([0.0, 0.0, height]))
-        )
+        name: Body(name, CUBE, 0.2, 0.5, (1.0, 0.0, 0.0, 1.0), SE3(np.eye(3), top + np.array([0.0, 0.0, height])))
         for name, height in (("lower", SIDE / 2), ("upper", 1.5 * SIDE))
     }
     plant = BulletPlant(replace(scenario, bodies=bodies), RobotModel())
