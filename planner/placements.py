@@ -16,7 +16,7 @@ from pinocchio import SE3
 from scenarios.regions import interior
 from scenarios.scenario import Region, Table
 from scenarios.shapes import Shape, extents
-from sim.scene import half_height
+from sim.scene import depth_below, height_above
 
 DROP = 0.01
 """Metres between the object's lowest point and what it will rest on, at release."""

@@ -102,21 +102,66 @@ class Ball(_Part):
     radius: Extent
 
 
-class Solid(_Part):
-    """One of box, cylinder and sphere. The origin is the geometric centre."""
+class Mesh(_Part):
+    """A convex mesh: the convex hull of points. Where these have their own origin makes no difference."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
+
+    vertices: Annotated[list[Position], Field(min_length=4, max_length=10_000)] | None = Field(
+        default=None, description="Points in metres; their convex hull, of at most 256 vertices, is taken."
+    )
+    file: str | None = Field(
+        default=None,
+        description="A Wavefront .obj file in the scene file's folder or below, in metres. It must be convex already.",
+    )
+
+    @model_validator(mode="after")
+    def _is_one(self) -> "Mesh":
+        if (self.vertices is None) == (self.file is None):
+            raise _problem("", "expected either vertices or a file")
+        return self
+
+
+class ConvexSolid(_Part):
+    """One of box, cylinder, sphere and mesh. The origin is the centre of volume."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
     box: Size | None = Field(default=None, description="Full extents along the object's x, y and z in metres.")
     cylinder: Round | None = Field(default=None, description="Radius and full height along the object's z in metres.")
     sphere: Ball | None = Field(default=None, description="Radius in metres.")
+    mesh: Mesh | None = Field(default=None, description="A convex polyhedron.")
 
     @model_validator(mode="after")
-    def _is_one(self) -> "Solid":
-        given = [key for key in type(self).model_fields if getattr(self, key) is not None]
+    def _is_one(self) -> "ConvexSolid":
+        fields = type(self).model_fields
+        given = [key for key in fields if getattr(self, key) is not None]
         if len(given) != 1:
-            raise _problem("", f"{len(given)} shapes are given, expected one of box, cylinder, sphere")
+            raise _problem("", f"{len(given)} shapes are given, expected one of {', '.join(fields)}")
         return self
+
+
+class PartPose(_Part):
+    """The frame of a part (its centre of volume) among the other parts."""
+
+    xyz: Position = Field(default=[0.0, 0.0, 0.0], description="Metres.")
+    rpy_deg: Angles = Field(default=[0.0, 0.0, 0.0], description="About the fixed axes x, then y, then z, in degrees.")
+
+
+class SolidPart(_Part):
+    """A convex part of a compound. All parts count in full: let them touch, but hardly overlap."""
+
+    shape: ConvexSolid
+    pose: PartPose = PartPose()
+
+
+class Solid(ConvexSolid):
+    """One of box, cylinder, sphere, mesh and compound. The origin is the centre of volume, which is what poses tell."""
+
+    compound: Annotated[list[SolidPart], Field(min_length=1, max_length=64)] | None = Field(
+        default=None,
+        description="One rigid body of convex parts (a mug, a bowl), posed among each other about any origin.",
+    )
 
 
 class Robot(_Part):
@@ -321,6 +366,10 @@ def _message(error: ErrorDetails) -> str:
             words = {"greater_than_equal": "of at least", "greater_than": "above", "less_than": "below"}
             bound = context.get("ge", context.get("gt", context.get("le", context.get("lt"))))
             return f"expected a number {words.get(kind, 'of at most')} {bound:g}, {got}"
+        case "too_short" | "too_long" if _holds_more_than_numbers(error["input"]):
+            bound = "at least" if kind == "too_short" else "at most"
+            count = context.get("min_length", context.get("max_length"))
+            return f"expected {bound} {count} entries, got {len(error['input'])}"
         case "too_short" | "too_long" if isinstance(error["input"], list):
             count = context.get("min_length", context.get("max_length"))
             return f"expected {count} numbers, got {len(error['input'])}"
@@ -337,6 +386,10 @@ def _message(error: ErrorDetails) -> str:
         case "string_pattern_mismatch":
             return f"expected text like #3355aa, {got}"
     return f"{error['msg']}, {got}"
+
+
+def _holds_more_than_numbers(value: Any) -> bool:
+    return isinstance(value, list) and any(isinstance(entry, list | dict) for entry in value)
 
 
 def _shown(value: Any) -> str:

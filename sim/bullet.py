@@ -19,7 +19,8 @@ from pinocchio import SE3
 
 from scenarios.regions import parts
 from scenarios.scenario import Scenario
-from scenarios.shapes import Box, Cylinder, Shape, Sphere
+from scenarios.shapes import Box, Shape
+from sim.bullet_shapes import add_collision_shape, add_visual_shape, principal_axes
 from sim.plant import Command, GripCommand, Observation
 from sim.robot import GRAVITY, RobotModel
 from sim.scene import floor_height
@@ -79,6 +80,7 @@ class BulletPlant:
         self._t = 0.0
         self._client = p.connect(p.GUI if window else p.DIRECT)
         self._names: dict[int, str] = {}
+        self._turned: dict[str, tuple[tuple[float, ...], SE3]] = {}
         p.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         p.setPhysicsEngineParameter(
             fixedTimeStep=PHYSICS_STEP,
@@ -105,6 +107,10 @@ class BulletPlant:
         for name, body in self._bodies.items():
             position, quaternion = p.getBasePositionAndOrientation(body, physicsClientId=self._client)
             linear, angular = p.getBaseVelocity(body, physicsClientId=self._client)
+            if name in self._turned:
+                position, quaternion = p.multiplyTransforms(
+                    position, quaternion, (0.0, 0.0, 0.0), self._turned[name][0]
+                )
             poses[name] = position + quaternion
             velocities[name] = linear + angular
         return Observation(
@@ -184,7 +190,8 @@ class BulletPlant:
 
     def put(self, name: str, X_WO: SE3) -> None:
         """Put a body elsewhere, at rest: what a person's hand does, for disturbances. The executive never calls it."""
-        pose = pin.SE3ToXYZQUAT(X_WO)
+        turned = self._turned.get(name)
+        pose = pin.SE3ToXYZQUAT(X_WO if turned is None else X_WO * turned[1])
         p.resetBasePositionAndOrientation(
             self._bodies[name], list(pose[:3]), list(pose[3:]), physicsClientId=self._client
         )
@@ -226,44 +233,24 @@ class BulletPlant:
             return self._link_names[link]
         return self._names[body]
 
-    def _collision_shape(self, shape: Shape) -> int:
-        match shape:
-            case Box(size):
-                return p.createCollisionShape(
-                    p.GEOM_BOX, halfExtents=[s / 2 for s in size], physicsClientId=self._client
-                )
-            case Cylinder(radius, height):
-                return p.createCollisionShape(
-                    p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._client
-                )
-            case Sphere(radius):
-                return p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=self._client)
-
-    def _visual_shape(self, shape: Shape, color: tuple[float, float, float, float]) -> int:
-        match shape:
-            case Box(size):
-                return p.createVisualShape(
-                    p.GEOM_BOX, halfExtents=[s / 2 for s in size], rgbaColor=color, physicsClientId=self._client
-                )
-            case Cylinder(radius, height):
-                return p.createVisualShape(
-                    p.GEOM_CYLINDER, radius=radius, length=height, rgbaColor=color, physicsClientId=self._client
-                )
-            case Sphere(radius):
-                return p.createVisualShape(p.GEOM_SPHERE, radius=radius, rgbaColor=color, physicsClientId=self._client)
-
     def _add(
         self, name: str, shape: Shape, X_WO: SE3, friction: float, mass: float, color: tuple[float, float, float, float]
     ) -> int:
-        pose = pin.SE3ToXYZQUAT(X_WO)
+        axes = principal_axes(shape)
+        pose = pin.SE3ToXYZQUAT(X_WO if axes is None else X_WO * axes[0])
+        X_IO = [0.0] * 6 + [1.0] if axes is None else pin.SE3ToXYZQUAT(axes[0].inverse()).tolist()
+        frame = {"visualFramePosition": X_IO[:3], "visualFrameOrientation": X_IO[3:]}
         body = p.createMultiBody(
             mass,
-            self._collision_shape(shape),
-            self._visual_shape(shape, color),
+            add_collision_shape(shape, self._client),
+            add_visual_shape(shape, self._client, rgbaColor=color, **frame),
             list(pose[:3]),
             list(pose[3:]),
             physicsClientId=self._client,
         )
+        if axes is not None:
+            moments = [mass * moment for moment in axes[1]]
+            p.changeDynamics(body, -1, localInertiaDiagonal=moments, collisionMargin=0.0, physicsClientId=self._client)
         p.changeDynamics(
             body,
             -1,
@@ -306,6 +293,10 @@ class BulletPlant:
 
     def _add_body(self, name: str) -> int:
         body = self.scenario.bodies[name]
+        axes = principal_axes(body.shape)
+        if axes is not None:
+            X_OI, _ = axes
+            self._turned[name] = tuple(pin.SE3ToXYZQUAT(X_OI.inverse())[3:].tolist()), X_OI
         identity = self._add(name, body.shape, body.X_WO, body.friction, body.mass, body.color)
         if body.contact_stiffness is not None and body.contact_damping is not None:
             p.changeDynamics(

@@ -14,7 +14,7 @@ from planner.task.symbols import GroundAction
 from scenarios.scenario import Body, Table
 from scenarios.shapes import extents
 from sim.robot import GRAVITY
-from sim.scene import Held, SceneState, half_height
+from sim.scene import Held, SceneState, height_above
 from skills.conditions import Achieved
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, Slide, Touch, guarded, sequence
@@ -172,7 +172,7 @@ class Drag:
         body, table = scene.scenario.bodies[name], scene.scenario.table
         X_WO = scene.poses[name]
         normal = edge_normal(table, pull.edge)
-        top = np.array([0.0, 0.0, half_height(body.shape, X_WO.rotation)])
+        top = np.array([0.0, 0.0, height_above(body.shape, X_WO.rotation)])
         R_WG = pin.rpy.rpyToMatrix(np.pi, 0.0, pull.yaw)
         X_WG_press = SE3(R_WG, X_WO.translation + top + normal * pull.press)
         X_WG_end = shifted(X_WG_press, normal * travel(body, X_WO, table, pull))

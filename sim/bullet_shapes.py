@@ -1,0 +1,115 @@
+"""Shapes in PyBullet, and the frame about which it turns them.
+
+PyBullet keeps a body's pose as that of its principal axes of inertia, and gives meshes and compounds the inertia of
+their bounding box. So these are built in their principal frame I (about O, the shape's own origin), with the true one.
+"""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pybullet as p
+from pinocchio import SE3
+
+from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, inertia
+from sim.surfaces import triangles
+
+
+def principal_axes(shape: Shape) -> tuple[SE3, np.ndarray] | None:
+    """X_OI and the principal moments (3,) per kg; None for a shape that PyBullet knows how to turn by itself."""
+    if not isinstance(shape, Hull | Compound):
+        return None
+    moments, axes = np.linalg.eigh(inertia(shape, 1.0))
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 2] = -axes[:, 2]
+    return SE3(axes, np.zeros(3)), moments
+
+
+def add_collision_shape(shape: Shape, client: int) -> int:
+    """The number of a new collision shape, a hull or compound in its principal frame.
+
+    A body made of one of these must be given a collision margin of zero: PyBullet puts the margin around a hull.
+    """
+    match shape:
+        case Box(size):
+            return p.createCollisionShape(p.GEOM_BOX, halfExtents=[s / 2 for s in size], physicsClientId=client)
+        case Cylinder(radius, height):
+            return p.createCollisionShape(p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=client)
+        case Sphere(radius):
+            return p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=client)
+        case Hull():
+            vertices = shape.solid.vertices @ _R_OI(shape)
+            return p.createCollisionShape(p.GEOM_MESH, vertices=vertices.tolist(), physicsClientId=client)
+        case Compound():
+            with _part_arrays(shape) as arrays:
+                return p.createCollisionShapeArray(**arrays, physicsClientId=client)
+
+
+def add_visual_shape(shape: Shape, client: int, **paint: Any) -> int:
+    """The number of a new visual shape, a hull or compound in its own frame O. `paint`: as createVisualShape has it."""
+    match shape:
+        case Box(size):
+            return p.createVisualShape(p.GEOM_BOX, halfExtents=[s / 2 for s in size], physicsClientId=client, **paint)
+        case Cylinder(radius, height):
+            return p.createVisualShape(p.GEOM_CYLINDER, radius=radius, length=height, physicsClientId=client, **paint)
+        case Sphere(radius):
+            return p.createVisualShape(p.GEOM_SPHERE, radius=radius, physicsClientId=client, **paint)
+        case Hull() | Compound():
+            corners = triangles(shape)
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            normals /= np.linalg.norm(normals, axis=1)[:, None]
+            return p.createVisualShape(
+                p.GEOM_MESH,
+                vertices=corners.reshape(-1, 3).tolist(),
+                indices=list(range(3 * len(corners))),
+                normals=np.repeat(normals, 3, axis=0).tolist(),
+                physicsClientId=client,
+                **paint,
+            )
+
+
+def _R_OI(shape: Shape) -> np.ndarray:
+    axes = principal_axes(shape)
+    return np.eye(3) if axes is None else axes[0].rotation
+
+
+@contextmanager
+def _part_arrays(shape: Compound) -> Iterator[dict[str, list]]:
+    """Arguments of createCollisionShapeArray; hulls, which it only takes from files, lie in a temporary folder."""
+    R_IO = _R_OI(shape).T
+    arrays: dict[str, list] = {"shapeTypes": [], "halfExtents": [], "radii": [], "lengths": [], "fileNames": []}
+    positions, quaternions = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for number, part in enumerate(shape.parts):
+            kind, half, radius, length, file = p.GEOM_BOX, [0.0] * 3, 0.0, 0.0, ""
+            match part.shape:
+                case Box(size):
+                    half = [s / 2 for s in size]
+                case Cylinder(r, h):
+                    kind, radius, length = p.GEOM_CYLINDER, r, h
+                case Sphere(r):
+                    kind, radius = p.GEOM_SPHERE, r
+                case Hull():
+                    kind, file = p.GEOM_MESH, str(Path(folder) / f"{number}.obj")
+                    Path(file).write_text(_obj(part.shape))
+            for key, value in zip(arrays, (kind, half, radius, length, file), strict=True):
+                arrays[key].append(value)
+            positions.append((R_IO @ part.X_OP.translation).tolist())
+            quaternions.append(pin.Quaternion(R_IO @ part.X_OP.rotation).coeffs().tolist())
+        yield {
+            **arrays,
+            "meshScales": [[1.0] * 3] * len(shape.parts),
+            "collisionFramePositions": positions,
+            "collisionFrameOrientations": quaternions,
+        }
+
+
+def _obj(hull: Hull) -> str:
+    solid = hull.solid
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in solid.vertices.tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in solid.triangles.tolist()]
+    return "\n".join(lines) + "\n"
