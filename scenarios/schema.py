@@ -9,12 +9,13 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import PydanticCustomError
 
 from scenarios.document import Document, KeyPath
 from scenarios.errors import SceneInvalid
 from scenarios.names import known
 from scenarios.robots import ROBOTS
+from scenarios.wording import message_of, path_of, shown
 
 VERSION = 1
 
@@ -317,19 +318,19 @@ def validate_document(document: Document) -> SceneFile:
     """Hold plain data against the format. Raises SceneInvalid with the first problem and how many more there are."""
     data = document.data
     if not isinstance(data, dict):
-        raise SceneInvalid(f"expected a scene (a mapping), got {_shown(data)}", document.file, document.place(()))
+        raise SceneInvalid(f"expected a scene (a mapping), got {shown(data)}", document.file, document.place(()))
     if "version" not in data:
         message = f"missing key 'version', expected version: {VERSION}"
         raise SceneInvalid(message, document.file, document.place(()))
     if data["version"] != VERSION or isinstance(data["version"], bool):
-        message = f"version is {_shown(data['version'])}, expected {VERSION}"
+        message = f"version is {shown(data['version'])}, expected {VERSION}"
         raise SceneInvalid(message, document.file, document.place(("version",)))
     try:
         return SceneFile.model_validate(data)
     except ValidationError as error:
         problems = error.errors(include_url=False)
-        first = min(problems, key=lambda problem: document.line(_path(problem)))
-        raise invalid(document, _path(first), _message(first), len(problems) - 1) from None
+        first = min(problems, key=lambda problem: document.line(path_of(problem)))
+        raise invalid(document, path_of(first), message_of(first), len(problems) - 1) from None
 
 
 def invalid(document: Document, path: KeyPath, message: str, more: int = 0) -> SceneInvalid:
@@ -340,68 +341,3 @@ def invalid(document: Document, path: KeyPath, message: str, more: int = 0) -> S
 
 def _problem(key: str, message: str) -> PydanticCustomError:
     return PydanticCustomError("scene", "{message}", {"message": message, "key": key})
-
-
-def _path(error: ErrorDetails) -> KeyPath:
-    path = tuple(key for key in error["loc"] if not (isinstance(key, str) and key.startswith("<")))
-    if error["type"] == "missing":
-        return path[:-1]
-    key = error.get("ctx", {}).get("key", "")
-    return (*path, key) if key else path
-
-
-def _message(error: ErrorDetails) -> str:
-    kind, context = error["type"], error.get("ctx", {})
-    got = f"got {_shown(error['input'])}"
-    match kind:
-        case "scene":
-            return str(context["message"])
-        case "missing":
-            return f"missing key {error['loc'][-1]!r}, expected it here"
-        case "float_type" | "int_type":
-            return f"expected a number, {got}"
-        case "finite_number":
-            return f"expected a finite number, {got}"
-        case "greater_than_equal" | "greater_than" | "less_than_equal" | "less_than":
-            words = {"greater_than_equal": "of at least", "greater_than": "above", "less_than": "below"}
-            bound = context.get("ge", context.get("gt", context.get("le", context.get("lt"))))
-            return f"expected a number {words.get(kind, 'of at most')} {bound:g}, {got}"
-        case "too_short" | "too_long" if _holds_more_than_numbers(error["input"]):
-            bound = "at least" if kind == "too_short" else "at most"
-            count = context.get("min_length", context.get("max_length"))
-            return f"expected {bound} {count} entries, got {len(error['input'])}"
-        case "too_short" | "too_long" if isinstance(error["input"], list):
-            count = context.get("min_length", context.get("max_length"))
-            return f"expected {count} numbers, got {len(error['input'])}"
-        case "too_long":
-            return f"expected at most {context['max_length']} entries, got {len(error['input'])}"
-        case "literal_error":
-            return f"expected {context['expected']}, {got}"
-        case "list_type":
-            return f"expected a list of numbers, {got}"
-        case "model_type" | "dict_type" | "model_attributes_type":
-            return f"expected a mapping, {got}"
-        case "string_type":
-            return f"expected text, {got}"
-        case "string_pattern_mismatch":
-            return f"expected text like #3355aa, {got}"
-    return f"{error['msg']}, {got}"
-
-
-def _holds_more_than_numbers(value: Any) -> bool:
-    return isinstance(value, list) and any(isinstance(entry, list | dict) for entry in value)
-
-
-def _shown(value: Any) -> str:
-    match value:
-        case None:
-            return "nothing"
-        case dict():
-            return "a mapping"
-        case list():
-            return "a list"
-        case bool():
-            return str(value).lower()
-        case str():
-            return repr(value if len(value) <= 40 else f"{value[:39]}…")
-    return f"{value:g}" if isinstance(value, float) else str(value)

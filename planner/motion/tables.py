@@ -10,7 +10,7 @@ SPHERE = 2
 HULL = 3
 
 # Columns of a table of solids. A hull lies about the middle of its bounding box; FIRST, COUNT and FACES are the row of
-# its first corner in a table of corners (n,3), the number of corners, and that of its faces, whose normals follow there.
+# its first corner in a table of corners (n,3), the number of corners, and that of faces, whose normals follow there.
 KIND, PART, BOUND, HALF, PLACE = 0, 1, 2, 3, 6
 FIRST, COUNT, FACES = 18, 19, 20
 SOLID_COLUMNS = 21
