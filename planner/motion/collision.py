@@ -219,14 +219,19 @@ def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | No
 def _obstacle_rows(standing: Standing) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     """Names, the table (n, OBSTACLE_COLUMNS) and that of its corners (h,3), as in `tables`."""
     world = standing.obstacles
-    table = np.zeros((len(world), OBSTACLE_COLUMNS))
-    for row, obstacle in zip(table, world, strict=True):
-        row[:SOLID_COLUMNS] = _solid_row(obstacle.shape, obstacle.X_WS, 0)
-        reach = np.abs(obstacle.X_WS.rotation) @ row[HALF : HALF + 3]
+    table, corners = placed_rows([(obstacle.shape, obstacle.X_WS) for obstacle in world])
+    return tuple(obstacle.name for obstacle in world), table, corners
+
+
+def placed_rows(solids: Sequence[tuple[Convex, SE3]]) -> tuple[np.ndarray, np.ndarray]:
+    """Table (n, OBSTACLE_COLUMNS) and corners (h,3) of placed solids."""
+    table = np.zeros((len(solids), OBSTACLE_COLUMNS))
+    for row, (shape, X) in zip(table, solids, strict=True):
+        row[:SOLID_COLUMNS] = _solid_row(shape, X, 0)
+        reach = np.abs(X.rotation) @ row[HALF : HALF + 3]
         row[LOWER : LOWER + 3] = row[FIRST - 3 : FIRST] - reach
         row[UPPER : UPPER + 3] = row[FIRST - 3 : FIRST] + reach
-    corners = _with_corners(table, [obstacle.shape for obstacle in world])
-    return tuple(obstacle.name for obstacle in world), table, corners
+    return table, _with_corners(table, [shape for shape, _ in solids])
 
 
 def _scene_arrays(arm: ArmArrays, parts: tuple[str, ...], scene: SceneState, margins: Margins) -> SceneArrays:
@@ -248,3 +253,16 @@ def _scene_arrays(arm: ArmArrays, parts: tuple[str, ...], scene: SceneState, mar
         link_pairs=np.array(links, dtype=float).reshape(-1, 3),
         solid_pairs=np.array(solids, dtype=float).reshape(-1, 3),
     )
+
+
+def clear_of(
+    moving: Sequence[tuple[Convex, SE3]], places: np.ndarray, standing: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """At which of the places (n,12, see `chain`) do the moving solids overlap none of the standing ones? (n,) of bool.
+
+    standing: what `placed_rows` gave.
+    """
+    rows = np.array([_solid_row(shape, X, 0) for shape, X in moving])
+    own = _with_corners(rows, [shape for shape, _ in moving])
+    margins = np.zeros((1, len(standing[0])))
+    return np.array([not hand_contacts(place[None], rows, own, *standing, margins).any() for place in places])
