@@ -65,6 +65,12 @@ class Layout:
         return None
 
 
+    def is_over_table(self, X_WO: SE3) -> bool:
+        """Does a body's centre lie above the table's plate, at whatever height?"""
+        x, y, z = X_WO.translation.tolist()
+        return all(side.holds((x, y, z)) for side in self._plate) and float(self._up @ X_WO.translation) > self._top
+
+
 def layout(scenario: Scenario) -> Layout:
     """The scenario's layout; the same object for the same scenario."""
     return _layout(_Identity(scenario))
