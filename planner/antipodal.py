@@ -12,6 +12,7 @@ from pinocchio import SE3
 
 from planner.motion.chain import placement
 from planner.motion.collision import clear_of, placed_rows
+from planner.stability import room_about
 from scenarios.shapes import Box, Compound, Convex, Hull, convex_parts, outline
 from sim.robot import Gripper
 from sim.surfaces import triangles
@@ -72,8 +73,10 @@ def antipodal_grips(shape: Hull | Compound, gripper: Gripper) -> Grips:
     """All that is found, always the same for the same shape. `cost`: 0 for flat, parallel faces, up to about 0.5."""
     solids = _Solids(shape)
     starts, directions = _lines(shape, solids)
-    pairs = _distinct(_pairs(solids, starts, directions, gripper.stroke - 2 * CLEARANCE))[: 2 * MOST]
+    widest = gripper.stroke - 2 * CLEARANCE
+    pairs = _distinct(_pairs(solids, starts, directions, widest))[: 2 * MOST]
     pairs = [replace(pair, cost=pair.cost + _roughness(solids, pair)) for pair in pairs]
+    pairs += _distinct(_faced(shape, widest))[:MOST]
     pairs.sort(key=lambda pair: pair.cost + 2.0 * _off_centre(pair))
     standing = placed_rows(convex_parts(shape))
     R, p, width, cost = [], [], [], []
@@ -166,6 +169,24 @@ def _pairs(solids: _Solids, starts: np.ndarray, directions: np.ndarray, widest: 
                 if LEAST_WIDTH <= leave - enter <= widest and solids.normals[b] @ d >= least:
                     slant = 2.0 + solids.normals[a] @ d - solids.normals[b] @ d
                     found.append(_Pair(start + d * (enter + leave) / 2, d, leave - enter, 3.0 * float(slant)))
+    return found
+
+
+def _faced(shape: Hull | Compound, widest: float) -> list[_Pair]:
+    """Pairs between a face, of a part or of the whole outline, and what lies farthest from it: another face, an edge or
+    a corner. One pad lies flat on the face; where the other one touches lies over that face, so nothing tilts."""
+    found = []
+    for convex, X_OP in [*convex_parts(shape), (shape, SE3.Identity())]:
+        solid = outline(convex)
+        for k, normal in enumerate(solid.normals):
+            heights = solid.vertices @ normal
+            width = float(solid.offsets[k] - heights.min())
+            far = solid.vertices[heights < heights.min() + SINK]
+            touch = far.mean(axis=0)
+            touch = touch + normal * float(heights.min() - touch @ normal)
+            if LEAST_WIDTH <= width <= widest and room_about(solid.face(k), normal, touch) > 0.0:
+                middle = touch + normal * width / 2
+                found.append(_Pair(X_OP.act(middle), -(X_OP.rotation @ normal), width, 0.3 / min(len(far), 3) - 0.1))
     return found
 
 

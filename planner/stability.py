@@ -73,7 +73,7 @@ def _faces(shape: Shape) -> list[tuple[np.ndarray, bool]]:
     solid = outline(shape)
     found = []
     for k, normal in enumerate(solid.normals):
-        inside = _room_about(solid.face(k), normal, np.zeros(3))
+        inside = room_about(solid.face(k), normal, np.zeros(3))
         if inside > 0.0:
             found.append((normal, inside >= max(FIRM * float(solid.offsets[k]), LEAST_BASE)))
     return found
@@ -82,10 +82,10 @@ def _faces(shape: Shape) -> list[tuple[np.ndarray, bool]]:
 def _middle_of(corners: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, float]:
     """Mean (3,) of a face's corners (n,3), and its distance to the nearest edge."""
     centre = corners.mean(axis=0)
-    return centre, _room_about(corners, normal, centre)
+    return centre, room_about(corners, normal, centre)
 
 
-def _room_about(corners: np.ndarray, normal: np.ndarray, p: np.ndarray) -> float:
+def room_about(corners: np.ndarray, normal: np.ndarray, p: np.ndarray) -> float:
     """Distance from the point p (3,), projected onto a face, to the face's nearest edge; below zero outside."""
     x = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
     x = x / np.linalg.norm(x)

@@ -37,11 +37,12 @@ class GenerateError(ValueError):
 
 @dataclass(frozen=True)
 class Plan:
-    """What a seed asks for: how many orders and things put aside, which sides, how near things stand."""
+    """What a seed asks for: how many objects, what kind of table, which of that kind, on which side the dustpan is."""
 
     rng: np.random.Generator
     objects: int
     kind: str
+    turn: int
     side: float
 
     @property
@@ -77,7 +78,7 @@ def table_kind(seed: int) -> str:
 def _attempt(rng: np.random.Generator, seed: int, objects: int, unsolvable: str | None) -> str | None:
     side = 1.0 if rng.random() < 0.5 else -1.0
     spoiling = None if unsolvable is None else spoiler(unsolvable, rng)
-    plan = Plan(rng, objects, "plain" if spoiling else table_kind(seed), side)
+    plan = Plan(rng, objects, "plain" if spoiling else table_kind(seed), seed // 10 + 2 * seed, side)
     groups = _groups(plan, spoiling)
     room = Room((0.42, 0.82, -0.26, 0.38))
     pan = float(rng.uniform(0.63, 0.67))
@@ -125,17 +126,17 @@ def _groups(plan: Plan, spoiling: Spoiler | None) -> list[Group]:
     if spoiling is not None and spoiling.group is not None:
         take(spoiling.group)
     has_crumbs = spoiling.may_have_crumbs if spoiling else rng.random() < 0.7
-    if "chain" in plan.kind:
+    if plan.kind == "chain":
         chains = [stack(rng, number_of(), 3), beside(rng, number_of(), topped=True)]
         take(chains[int(rng.integers(2))])
     if "aside" in plan.kind:
-        take(stack(rng, number_of(), 2, goes="table"))
+        take(stack(rng, number_of(), 3 if plan.kind == "chain-aside" else 2, goes="table"))
     if plan.kind == "order":
-        orders = [stack(rng, number_of(), 2), beside(rng, number_of()), flat(rng, number_of(), plan.side)]
-        orders.append(flat_under(rng, number_of(), plan.side))
-        take(orders[int(rng.integers(4))])
-    elif plan.kind == "chain" and rng.random() < 0.3 and left > 2:
-        take(flat(rng, number_of(), plan.side))
+        orders = [stack(rng, number_of(), 2), beside(rng, number_of()), flat(rng, number_of())]
+        orders.append(flat_under(rng, number_of()))
+        take(orders[plan.turn % 4])
+    elif plan.kind == "chain" and rng.random() < 0.5 and left > 2:
+        take(flat(rng, number_of()))
     if has_crumbs and left and not (spoiling and spoiling.group and _is_crumbs(spoiling.group)):
         take(crumbs(rng, number_of(), min(left, int(rng.integers(1, 2 + left // 4)), 3)))
     while left:
@@ -252,5 +253,5 @@ KINDS_TOLD = {
     "crumb-behind-wall": "a fixed wall stands across the whole table between a crumb and the dustpan",
     "out-of-reach": "something stands farther away than the arm reaches",
     "too-heavy": "something is heavier than the fingers' friction holds",
-    "flat-blocked": "something lies flat, wider than the hand opens, and fixed walls stand along every edge of the table",
+    "flat-blocked": "something lies flat, wider than the hand opens, and fixed walls stand along all edges",
 }

@@ -1,5 +1,7 @@
 """Groups of things for generated tables, each of which the arm can clear in the order it tells."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from scenarios.arranging import Group, Piece
@@ -40,7 +42,7 @@ def stack(rng: np.random.Generator, number: str, count: int, goes: str = "bin") 
         pieces.append(Piece(name, ware, height=round(height, 4), goes=goes if is_top else "bin"))
         height += ware.size[2]
     names = [piece.name for piece in pieces]
-    orders = tuple((upper, lower) for lower, upper in zip(names[:-1], names[1:], strict=True))[::-1]
+    orders = tuple((upper, lower) for lower, upper in pairwise(names))[::-1]
     return Group(tuple(pieces), (edges[0] * 0.525, edges[0] * 0.525), orders, may_turn=True)
 
 
@@ -64,17 +66,16 @@ def beside(rng: np.random.Generator, number: str, topped: bool = False) -> Group
     return Group(tuple(pieces), (0.0625, span / 2), tuple(orders))
 
 
-def flat(rng: np.random.Generator, number: str, side: float) -> Group:
+def flat(rng: np.random.Generator, number: str) -> Group:
     """A flat box, wider than the hand opens both ways: it must be dragged over the edge before it is taken."""
     ware = box(rng.uniform(0.145, 0.165), rng.uniform(0.2, 0.22), 0.03, "book")
-    # Its way to the edge opposite the dustpan belongs to the group.
     name = f"book_{number}"
     return Group((Piece(name, ware, (0.0, 0.0)),), (0.085, 0.125), ((f"drag {name}", f"pick {name}"),), _EDGE)
 
 
-def flat_under(rng: np.random.Generator, number: str, side: float) -> Group:
+def flat_under(rng: np.random.Generator, number: str) -> Group:
     """The same with something on top of it that must go first."""
-    group = flat(rng, number, side)
+    group = flat(rng, number)
     (book,) = group.pieces
     cube = box(0.05, 0.05, round(float(rng.uniform(0.045, 0.06)), 4))
     on_top = Piece(f"box_{int(number) + 1}", cube, (0.0, 0.0), height=book.ware.size[2])
@@ -96,7 +97,9 @@ def _ware(rng: np.random.Generator, small: bool) -> Ware:
     if kind == 3:
         return prism(rng, scale * rng.uniform(0.028, 0.036), scale * rng.uniform(0.05, 0.09))
     if kind == 4:
-        return wedge(scale * rng.uniform(0.06, 0.08), scale * rng.uniform(0.045, 0.06), scale * rng.uniform(0.04, 0.055))
+        return wedge(
+            scale * rng.uniform(0.06, 0.08), scale * rng.uniform(0.045, 0.06), scale * rng.uniform(0.04, 0.055)
+        )
     if kind == 5:
         return mug(rng.uniform(0.034, 0.04), rng.uniform(0.08, 0.095))
     return bowl(rng.uniform(0.044, 0.048), rng.uniform(0.05, 0.06))

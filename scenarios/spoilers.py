@@ -40,7 +40,7 @@ def spoiler(kind: str, rng: np.random.Generator) -> Spoiler:
         case "too-heavy":
             return _too_heavy(rng)
         case "flat-blocked":
-            return Spoiler(flat(rng, "1", 1.0), _rims, may_have_crumbs=False)
+            return Spoiler(flat(rng, "1"), _rims, may_have_crumbs=False)
     raise ValueError(f"unknown kind {kind!r}, known: {', '.join(KINDS)}")
 
 

@@ -37,11 +37,10 @@ def can(radius: float, height: float) -> Ware:
 
 
 def prism(rng: np.random.Generator, radius: float, height: float) -> Ware:
-    """A mesh: a column with 5 to 8 sides, a little narrower at the top."""
+    """A mesh: a column with 5 to 8 sides."""
     angles = np.arange(count := int(rng.integers(5, 9))) * 2 * np.pi / count
     rings = [
-        np.column_stack([r * np.cos(angles), r * np.sin(angles), np.full(count, z)])
-        for r, z in ((radius, 0.0), (0.96 * radius, height))
+        np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(count, z)]) for z in (0.0, height)
     ]
     return _mesh("prism", np.concatenate(rings))
 

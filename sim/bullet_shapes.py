@@ -15,7 +15,8 @@ import pinocchio as pin
 import pybullet as p
 from pinocchio import SE3
 
-from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, inertia
+from scenarios.hulls import Polyhedron, ShapeError, polyhedron
+from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, convex_parts, inertia
 from sim.surfaces import triangles
 
 
@@ -41,11 +42,8 @@ def add_collision_shape(shape: Shape, client: int) -> int:
             return p.createCollisionShape(p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=client)
         case Sphere(radius):
             return p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=client)
-        case Hull():
-            vertices = shape.solid.vertices @ _R_OI(shape)
-            return p.createCollisionShape(p.GEOM_MESH, vertices=vertices.tolist(), physicsClientId=client)
-        case Compound():
-            with _part_arrays(shape) as arrays:
+        case Hull() | Compound():
+            with _part_arrays(_octants(shape) if isinstance(shape, Hull) else _parts(shape), _R_OI(shape).T) as arrays:
                 return p.createCollisionShapeArray(**arrays, physicsClientId=client)
 
 
@@ -77,39 +75,71 @@ def _R_OI(shape: Shape) -> np.ndarray:
     return np.eye(3) if axes is None else axes[0].rotation
 
 
+_Piece = tuple[Box | Cylinder | Sphere | Polyhedron, SE3]
+
+
+def _parts(shape: Compound) -> list[_Piece]:
+    return [(part.solid if isinstance(part, Hull) else part, X_OP) for part, X_OP in convex_parts(shape)]
+
+
+def _octants(hull: Hull) -> list[_Piece]:
+    """The hull cut along its three axes: PyBullet finds one point of contact at a time for a pair of convex solids, and
+    a hull in one piece would turn about it, in the hand as on the table."""
+    pieces = [hull.solid.vertices]
+    for axis in np.eye(3):
+        pieces = [half for points in pieces for half in _cut(points, axis)]
+    found: list[_Piece] = []
+    for points in pieces:
+        try:
+            found.append((polyhedron(points), SE3.Identity()))
+        except ShapeError:  # a sliver
+            continue
+    return found
+
+
+def _cut(points: np.ndarray, axis: np.ndarray) -> Iterator[np.ndarray]:
+    """The corners (n,3) of both halves of a convex solid with corners (m,3), cut square to the axis at the origin."""
+    height = points @ axis
+    above, below = points[height > 0.0], points[height < 0.0]
+    a, b = np.repeat(above, len(below), axis=0), np.tile(below, (len(above), 1))
+    share = (a @ axis) / ((a - b) @ axis)
+    level = np.concatenate([a + (b - a) * share[:, None], points[height == 0.0]])
+    for side in (above, below):
+        if len(side):
+            yield np.concatenate([side, level])
+
+
 @contextmanager
-def _part_arrays(shape: Compound) -> Iterator[dict[str, list]]:
-    """Arguments of createCollisionShapeArray; hulls, which it only takes from files, lie in a temporary folder."""
-    R_IO = _R_OI(shape).T
+def _part_arrays(parts: list[_Piece], R_IO: np.ndarray) -> Iterator[dict[str, list]]:
+    """Arguments of createCollisionShapeArray; polyhedra, which it only takes from files, lie in a temporary folder."""
     arrays: dict[str, list] = {"shapeTypes": [], "halfExtents": [], "radii": [], "lengths": [], "fileNames": []}
     positions, quaternions = [], []
     with tempfile.TemporaryDirectory() as folder:
-        for number, part in enumerate(shape.parts):
+        for number, (shape, X_OP) in enumerate(parts):
             kind, half, radius, length, file = p.GEOM_BOX, [0.0] * 3, 0.0, 0.0, ""
-            match part.shape:
+            match shape:
                 case Box(size):
                     half = [s / 2 for s in size]
                 case Cylinder(r, h):
                     kind, radius, length = p.GEOM_CYLINDER, r, h
                 case Sphere(r):
                     kind, radius = p.GEOM_SPHERE, r
-                case Hull():
+                case Polyhedron():
                     kind, file = p.GEOM_MESH, str(Path(folder) / f"{number}.obj")
-                    Path(file).write_text(_obj(part.shape))
+                    Path(file).write_text(_obj(shape))
             for key, value in zip(arrays, (kind, half, radius, length, file), strict=True):
                 arrays[key].append(value)
-            positions.append((R_IO @ part.X_OP.translation).tolist())
-            quaternions.append(pin.Quaternion(R_IO @ part.X_OP.rotation).coeffs().tolist())
+            positions.append((R_IO @ X_OP.translation).tolist())
+            quaternions.append(pin.Quaternion(R_IO @ X_OP.rotation).coeffs().tolist())
         yield {
             **arrays,
-            "meshScales": [[1.0] * 3] * len(shape.parts),
+            "meshScales": [[1.0] * 3] * len(parts),
             "collisionFramePositions": positions,
             "collisionFrameOrientations": quaternions,
         }
 
 
-def _obj(hull: Hull) -> str:
-    solid = hull.solid
+def _obj(solid: Polyhedron) -> str:
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in solid.vertices.tolist()]
     lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in solid.triangles.tolist()]
     return "\n".join(lines) + "\n"

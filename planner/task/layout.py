@@ -64,7 +64,6 @@ class Layout:
                 return TABLE
         return None
 
-
     def is_over_table(self, X_WO: SE3) -> bool:
         """Does a body's centre lie above the table's plate, at whatever height?"""
         x, y, z = X_WO.translation.tolist()

@@ -46,7 +46,7 @@ def _hand(X_OG: SE3, gap: float) -> Solid:
     return Solid("hand", tuple((shape, X_OG * X) for shape, X in parts))
 
 
-@settings(derandomize=True, max_examples=12, deadline=None)
+@settings(derandomize=True, max_examples=5, deadline=None)
 @given(st.integers(0, 10_000))
 def test_the_open_hand_touches_nothing_and_the_closed_one_touches_on_both_sides(seed):
     shape = _hull(seed)
@@ -60,9 +60,9 @@ def test_the_open_hand_touches_nothing_and_the_closed_one_touches_on_both_sides(
         assert all(min(distance(finger, part) for part in convex_parts(shape)) < 0.0 for finger in closed)
 
 
-@settings(derandomize=True, max_examples=12, deadline=None)
+@settings(derandomize=True, max_examples=5, deadline=None)
 @given(st.integers(0, 10_000))
-def test_both_contacts_lie_within_the_friction_cone(seed):
+def test_the_pads_touch_squarely_or_where_nothing_reaches_farther(seed):
     shape = _hull(seed)
     grips = antipodal_grips(shape, WSG50)
     for k in range(0, len(grips.width), 29):
@@ -72,14 +72,22 @@ def test_both_contacts_lie_within_the_friction_cone(seed):
             out = side * R[:, 1]
             contact = middle + half * out
             gaps = shape.solid.normals @ contact - shape.solid.offsets
-            assert gaps.max() == pytest.approx(0.0, abs=1e-6)
-            assert np.any((gaps > -1e-6) & (shape.solid.normals @ out > np.cos(CONE) - 1e-6))
+            assert abs(gaps.max()) <= SINK
+            is_square = np.any((gaps > -1e-6) & (shape.solid.normals @ out > np.cos(CONE) - 1e-6))
+            assert is_square or contact @ out > reach(shape, out) - SINK
 
 
 def test_a_mug_is_taken_round_its_outside_by_its_wall_and_by_its_handle():
     width = antipodal_grips(_mug(), WSG50).width
     for extent in (0.08, 0.006, 0.01):
         assert np.any(np.abs(width - extent) < 0.002)
+
+
+def test_a_column_with_five_sides_is_taken_between_a_side_and_the_edge_across():
+    angles = np.arange(5) * 2 * np.pi / 5
+    column = [[0.03 * np.cos(a), 0.03 * np.sin(a), z] for a in angles for z in (0.0, 0.08)]
+    width = antipodal_grips(Hull.of(np.array(column))[0], WSG50).width
+    assert np.any(np.abs(width - 0.03 * (1 + np.cos(np.pi / 5))) < 1e-6)
 
 
 def test_what_is_wider_than_the_stroke_is_taken_by_no_side():
