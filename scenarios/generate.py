@@ -22,7 +22,9 @@ from scenarios.spoilers import KINDS, Spoiler, spoiler
 from scenarios.wares import Ware, box, number
 
 MOST_OBJECTS = 24
-ATTEMPTS = 60
+ATTEMPTS = 120
+FLAT_UP_TO = 10
+"""Objects up to which one of them may be a flat box, which takes a good part of the table."""
 
 COLORS = (
     "#3355aa #3fa34d #f77f00 #d62828 #7b2cbf #1b998b #c8553d #588b8b #e0a458 #5f0f40 #2d7dd2 #97cc04".split()
@@ -48,7 +50,7 @@ class Plan:
     @property
     def margin(self) -> float:
         """Metres of free space about every group: half of what a finger takes beside each."""
-        return 0.024 if self.objects <= 8 else 0.018 if self.objects <= 14 else 0.014
+        return 0.024 if self.objects <= 8 else 0.018 if self.objects <= 12 else 0.012
 
 
 def generate(seed: int, objects: int, unsolvable: str | None = None) -> str:
@@ -112,7 +114,7 @@ def _groups(plan: Plan, spoiling: Spoiler | None) -> list[Group]:
     """Groups of as many things as were asked for, those that the plan's kind needs first."""
     rng, left = plan.rng, plan.objects
     found: list[Group] = []
-    small = plan.objects > 10
+    scale = 1.0 if plan.objects <= 10 else 0.82 if plan.objects <= 14 else 0.7
 
     def take(group: Group | None) -> None:
         nonlocal left
@@ -134,13 +136,13 @@ def _groups(plan: Plan, spoiling: Spoiler | None) -> list[Group]:
     if plan.kind == "order":
         orders = [stack(rng, number_of(), 2), beside(rng, number_of()), flat(rng, number_of())]
         orders.append(flat_under(rng, number_of()))
-        take(orders[plan.turn % 4])
-    elif plan.kind == "chain" and rng.random() < 0.5 and left > 2:
+        take(orders[plan.turn % (4 if plan.objects <= FLAT_UP_TO else 2)])
+    elif plan.kind == "chain" and rng.random() < 0.5 and 2 < left <= FLAT_UP_TO:
         take(flat(rng, number_of()))
     if has_crumbs and left and not (spoiling and spoiling.group and _is_crumbs(spoiling.group)):
         take(crumbs(rng, number_of(), min(left, int(rng.integers(1, 2 + left // 4)), 3)))
     while left:
-        take(lone(rng, number_of(), small))
+        take(lone(rng, number_of(), scale))
     return found
 
 

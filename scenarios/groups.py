@@ -11,9 +11,9 @@ GAP = 0.01
 """Metres between two things that stand side by side: less than a finger takes."""
 
 
-def lone(rng: np.random.Generator, number: str, small: bool) -> Group:
-    """One thing of any kind that the fingers can span."""
-    ware = _ware(rng, small)
+def lone(rng: np.random.Generator, number: str, scale: float) -> Group:
+    """One thing of any kind that the fingers can span, made smaller by `scale`."""
+    ware = _ware(rng, scale)
     half = (ware.size[0] / 2, ware.size[1] / 2)
     return Group((Piece(f"{ware.kind}_{number}", ware),), half, may_turn=True)
 
@@ -86,20 +86,17 @@ _EDGE = (0.55, 0.61, 0.22, 0.235)
 """Where a flat box may lie, near the table's edge opposite the dustpan."""
 
 
-def _ware(rng: np.random.Generator, small: bool) -> Ware:
-    scale = 0.82 if small else 1.0
+def _ware(rng: np.random.Generator, scale: float) -> Ware:
     kind = int(rng.integers(7))
     if kind <= 1:
         x, y = scale * rng.uniform(0.045, 0.075, 2)
-        return box(x, y, scale * rng.uniform(0.05, 0.1 if small else 0.12))
+        return box(x, y, scale * rng.uniform(0.05, 0.12))
     if kind == 2:
         return can(scale * rng.uniform(0.025, 0.035), scale * rng.uniform(0.06, 0.11))
     if kind == 3:
         return prism(rng, scale * rng.uniform(0.028, 0.036), scale * rng.uniform(0.05, 0.09))
     if kind == 4:
-        return wedge(
-            scale * rng.uniform(0.06, 0.08), scale * rng.uniform(0.045, 0.06), scale * rng.uniform(0.04, 0.055)
-        )
+        return wedge(*(scale * rng.uniform((0.06, 0.045, 0.04), (0.08, 0.06, 0.055))))
     if kind == 5:
-        return mug(rng.uniform(0.034, 0.04), rng.uniform(0.08, 0.095))
-    return bowl(rng.uniform(0.044, 0.048), rng.uniform(0.05, 0.06))
+        return mug(max(scale, 0.85) * rng.uniform(0.034, 0.04), rng.uniform(0.08, 0.095))
+    return bowl(max(scale, 0.85) * rng.uniform(0.044, 0.048), rng.uniform(0.05, 0.06))

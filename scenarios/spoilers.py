@@ -84,9 +84,9 @@ def _out_of_reach(rng: np.random.Generator) -> Spoiler:
 
 def _too_heavy(rng: np.random.Generator) -> Spoiler:
     mass = number(rng.uniform(18.0, 40.0))
-    size = tuple(float(n) for n in rng.uniform(0.055, 0.075, 3))
-    block = Piece("block_1", box(*size, "block"), mass=mass)
-    return Spoiler(Group((block,), (size[0] / 2, size[1] / 2), may_turn=True), lambda data, side: None)
+    x, y, z = (float(n) for n in rng.uniform(0.055, 0.075, 3))
+    block = Piece("block_1", box(x, y, z, "block"), mass=mass)
+    return Spoiler(Group((block,), (x / 2, y / 2), may_turn=True), lambda data, side: None)
 
 
 def _wall_across(data: dict[str, Any], side: float) -> None:
