@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
+from pathlib import Path
 from statistics import median
 
 from rich.console import Console
@@ -66,7 +67,7 @@ def print_table(console: Console, rows: Mapping[Job, Row]) -> None:
         table.add_column(heading, justify="right")
     for one in found:
         figures = (_shown(one.robot_s), _shown(one.wall_s), _shown(one.planning_cpu_s))
-        table.add_row(one.scene, str(one.runs), f"{one.reached}/{one.runs}", *figures, str(one.unintended))
+        table.add_row(Path(one.scene).stem, str(one.runs), f"{one.reached}/{one.runs}", *figures, str(one.unintended))
     console.print(table)
     for one in found:
         for seed, reason in one.failures:

@@ -18,7 +18,10 @@ from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, exten
 from sim.robot import Gripper
 
 APPROACH_STEP = np.radians(15.0)
-MAX_DEPTH = 0.045
+DEPTHS = (0.075, 0.045)
+"""Metres that the fingers reach over an object, where it is large enough: far, so that it doesn't swing about the line
+between the pads, or less where something stands close."""
+
 MIN_DEPTH = 0.02
 TIP_CLEARANCE = 0.012
 """Metres that the fingertips stay short of the object's far side, where what it lies on may be."""
@@ -66,7 +69,8 @@ def grasps(shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.
     outward = outward / max(float(np.linalg.norm(outward)), 1e-6)
     offset = np.linalg.norm(np.cross(found.p, found.R[:, :, 2]), axis=1)
     level = 1.0 - np.abs(approach[:, 2])
-    score = -approach[:, 2] + 0.5 * level * (approach @ outward) - 4.0 * offset - found.cost
+    lever = np.abs(np.einsum("ij,ij->i", found.p, found.R[:, :, 2]))
+    score = -approach[:, 2] + 0.5 * level * (approach @ outward) - 4.0 * offset - 2.0 * lever - found.cost
     score += JITTER * rng.random(len(offset))
     for index in np.argsort(-score, kind="stable"):
         yield Grasp.at(SE3(found.R[index], found.p[index]), float(found.width[index]))
@@ -122,15 +126,15 @@ def _box_grasps(size: np.ndarray, gripper: Gripper) -> Iterator[tuple[np.ndarray
         for angle in np.arange(0.0, 2 * np.pi - 1e-9, APPROACH_STEP):
             approach = np.cos(angle) * np.eye(3)[first] + np.sin(angle) * np.eye(3)[second]
             for side, entry, exit_ in _lines_through(size, approach, axis):
-                depth = min(MAX_DEPTH, exit_ - entry - TIP_CLEARANCE)
-                if depth < min(MIN_DEPTH, 0.6 * (exit_ - entry)):
-                    continue
                 lateral = np.cross(approach, closing)
-                position = lateral * side + approach * (entry + depth)
-                for sign in (1.0, -1.0):
-                    y = sign * closing
-                    R_FG = np.column_stack([np.cross(y, approach), y, approach])
-                    yield R_FG, position, width
+                for depth in sorted({min(depth, exit_ - entry - TIP_CLEARANCE) for depth in DEPTHS}):
+                    if depth < min(MIN_DEPTH, 0.6 * (exit_ - entry)):
+                        continue
+                    position = lateral * side + approach * (entry + depth)
+                    for sign in (1.0, -1.0):
+                        y = sign * closing
+                        R_FG = np.column_stack([np.cross(y, approach), y, approach])
+                        yield R_FG, position, width
 
 
 def _lines_through(size: np.ndarray, approach: np.ndarray, axis: int) -> Iterator[tuple[float, float, float]]:

@@ -93,7 +93,7 @@ class PlanRefiner:
                     self._report("refined", {"action": str(step.action)})
                     situation, position = after, resumed
                     continue
-                failure, targets = _spoiled(outcome), [depth]
+                failure, targets = _spoiled(outcome, step.adds - after.facts), [depth]
             else:
                 failure, targets = outcome, _targets(outcome, situation, chosen)
             self._report(
@@ -137,8 +137,10 @@ def _as_predicted(step: Step, before: frozenset[Fact], after: frozenset[Fact]) -
     return replace(step, adds=step.adds | (after - expected), deletes=step.deletes | (expected - after))
 
 
-def _spoiled(refinement: Refinement) -> RefinementFailure:
+def _spoiled(refinement: Refinement, missing: frozenset[Fact]) -> RefinementFailure:
     reason = "it would bring about something that stands against the rest of the plan"
+    if missing:
+        reason = f"it is not expected to bring about {', '.join(map(str, sorted(missing)))}"
     return RefinementFailure(refinement.action, reason, (Blocked(refinement.sample, reason),))
 
 

@@ -30,10 +30,11 @@ def pairs(first: frozenset[str] | str, second: frozenset[str] | str) -> frozense
 @dataclass(frozen=True)
 class Press:
     """Contact force of a phase: `force` N along −z of W, with `stiffness` (6,) (N/m, Nm/rad; linear first, in W)
-    in the directions that are not force-controlled."""
+    in the directions that are not force-controlled, and so many times critical `damping`."""
 
     force: float
     stiffness: np.ndarray
+    damping: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from planner.refinement import Budget, Refinement, Refiners, Work
 from planner.task.compilation import with_constraints
 from planner.task.facts import facts, objects_of, observed_facts, place_of, stated_in
 from planner.task.given import Given
+from planner.task.lacking import lacking
 from planner.task.learned import Learned
 from planner.task.pddl import Domain, Problem, write_domain, write_problem
 from planner.task.planner import TaskPlanner
@@ -251,6 +252,7 @@ class SearchThenSample:
         lost = sorted({fact.args[0] for fact in missing if fact.args and self._is_lost(scene, fact.args[0])})
         reasons = [f"{name} lies neither on the table nor in a region" for name in lost] + proofs.sentences()
         reason = f"no sequence of actions leads to {', '.join(map(str, missing))}"
+        reasons += lacking(self._domain, self.facts(scene), missing)
         if reasons:
             reason += f": {'; '.join(reasons)}"
         return NoPlan("proven", reason, proofs.culprits().union(lost), number)

@@ -51,21 +51,28 @@ def level_top(shape: Shape, X_WO: SE3) -> tuple[np.ndarray, float, float] | None
 
     The square is inscribed in the largest circle about the middle of a face. None if the top is round or tilted.
     """
-    up_O = X_WO.rotation[2]
-    height = reach(shape, up_O)
     best: tuple[np.ndarray, float, float] | None = None
+    for corners, normal in tops(shape, X_WO.rotation[2], UPRIGHT):
+        centre, radius = _middle_of(corners, normal)
+        half = radius / np.sqrt(2.0)
+        if best is None or half > best[2]:
+            best = X_WO.act(centre), 0.0, half
+    return best
+
+
+def tops(shape: Shape, up_O: np.ndarray, level: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Flat faces than which nothing of the shape is higher: corners (n,3) and normal (3,) in O. `up_O` (3,) is the way
+    up in O, `level` the cosine of the angle off it up to which a face counts."""
+    height = reach(shape, up_O)
+    found = []
     for part, X_OP in convex_parts(shape):
         solid = outline(part)
         normals = solid.normals @ X_OP.rotation.T
-        for k in np.flatnonzero(normals @ up_O > UPRIGHT):
+        for k in np.flatnonzero(normals @ up_O > level):
             corners = solid.face(int(k)) @ X_OP.rotation.T + X_OP.translation
-            if height - float((corners @ up_O).max()) > SAME_HEIGHT:
-                continue
-            centre, radius = _middle_of(corners, normals[k])
-            half = radius / np.sqrt(2.0)
-            if best is None or half > best[2]:
-                best = X_WO.act(centre), 0.0, half
-    return best
+            if height - float((corners @ up_O).max()) <= SAME_HEIGHT:
+                found.append((corners, normals[k]))
+    return found
 
 
 def _faces(shape: Shape) -> list[tuple[np.ndarray, bool]]:

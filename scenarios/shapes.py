@@ -212,6 +212,23 @@ def bounding_radius(shape: Shape) -> float:
             return max(float(np.linalg.norm(part.position)) + bounding_radius(part.shape) for part in parts)
 
 
+def inscribed_radius(shape: Shape) -> float:
+    """Radius in metres of the largest sphere about the origin inside the shape, for a compound inside one of its parts;
+    0 if the origin lies in none of them, as in a mug's hollow."""
+    match shape:
+        case Box(size):
+            return min(size) / 2
+        case Cylinder(radius, height):
+            return min(radius, height / 2)
+        case Sphere(radius):
+            return radius
+        case Hull():
+            return float(shape.solid.offsets.min())
+        case Compound():
+            solids = ((outline(part), X_OP.inverse().translation) for part, X_OP in convex_parts(shape))
+            return max(0.0, *(-solid.outside(p_PO) for solid, p_PO in solids))
+
+
 def volume(shape: Shape) -> float:
     """Volume in cubic metres."""
     match shape:

@@ -5,9 +5,9 @@ couples the two fingers, as the gear does in the real gripper. Two frictions com
 """
 
 import tempfile
+import weakref
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -21,9 +21,10 @@ from scenarios.regions import parts
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, Shape
 from sim.bullet_shapes import add_collision_shape, add_visual_shape, principal_axes
+from sim.contact import NORMAL_FORCE, Contact
 from sim.plant import Command, GripCommand, Observation
 from sim.robot import GRAVITY, RobotModel
-from sim.scene import floor_height
+from sim.scene import floor_height, pedestal
 from sim.wrench import Wrench
 
 T = TypeVar("T")
@@ -37,7 +38,11 @@ CONTACT_BREAKING = 0.002
 """Metres after which a contact point is given up. With Bullet's own 0.02 stale points under the pads let a book
 turn in the hand by 3° a second while everything stands still."""
 
-PEDESTAL_SIZE = 0.24
+RESISTANCE = 0.001
+"""Metres, before it is multiplied by the other body's friction: lever of the force that resists rolling on what stands
+fast, as of things on wood, and turning on the spot, as of things between rubber pads. Without it a glass on its rim or
+a ball never come to rest, and a soft thing turns in the hand."""
+
 FLOOR_FRICTION = 0.8
 GEAR_STIFFNESS = 2e4
 """N/m between the fingers' slides. PyBullet's own gear constraint (JOINT_GEAR) would be felt by the wrist
@@ -45,17 +50,6 @@ sensor as if it were an outside force: 13 N with the fingers pressed against the
 
 GEAR_DAMPING = 40.0
 """N s/m: damps the 0.1 kg fingers well and is stable at 1 kHz."""
-
-
-@dataclass(frozen=True)
-class Contact:
-    """A true contact point: the two names, position (3,) in W, force (3,) in N on the first, in W."""
-
-    first: str
-    second: str
-    position: np.ndarray
-    force: np.ndarray
-    normal_force: float
 
 
 @contextmanager
@@ -79,6 +73,9 @@ class BulletPlant:
         self.timestep = PHYSICS_STEP
         self._t = 0.0
         self._client = p.connect(p.GUI if window else p.DIRECT)
+        # A plant that nobody closed keeps its engine, 10 MB and more, until the process ends.
+        self._free = weakref.finalize(self, p.disconnect, self._client)
+        self._free.atexit = False
         self._names: dict[int, str] = {}
         self._turned: dict[str, tuple[tuple[float, ...], SE3]] = {}
         p.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
@@ -95,7 +92,7 @@ class BulletPlant:
 
     def close(self) -> None:
         """Free the engine. The plant can't be used afterwards."""
-        p.disconnect(self._client)
+        self._free()
 
     def observe(self) -> Observation:
         arm = p.getJointStates(self._robot, self._arm_joints, physicsClientId=self._client)
@@ -127,11 +124,12 @@ class BulletPlant:
         )
 
     def apply(self, command: Command) -> None:
-        if not np.all(np.isfinite(command.tau)):
+        if not np.isfinite(command.tau).all():
             raise ValueError(f"torque command must be finite, got {command.tau}")
-        self._tau = np.clip(command.tau, -self._tau_max, self._tau_max)
-        speed = float(np.clip(command.grip.speed, -self._max_grip_speed, self._max_grip_speed)) / 2
-        force = float(np.clip(command.grip.force, 0.0, self._max_grip_force))
+        self._tau = np.minimum(np.maximum(command.tau, -self._tau_max), self._tau_max)
+        self._torques = self._tau.tolist()
+        speed = min(max(float(command.grip.speed), -self._max_grip_speed), self._max_grip_speed) / 2
+        force = min(max(float(command.grip.force), 0.0), self._max_grip_force)
         p.setJointMotorControlArray(
             self._robot,
             self._finger_joints,
@@ -149,7 +147,7 @@ class BulletPlant:
             self._robot,
             self._arm_joints + self._finger_joints,
             p.TORQUE_CONTROL,
-            forces=[*self._tau, gear, -gear],
+            forces=[*self._torques, gear, -gear],
             physicsClientId=self._client,
         )
         self.lap("drive")
@@ -159,16 +157,11 @@ class BulletPlant:
 
     def contacts(self) -> list[Contact]:
         """True contacts that carry force, for reports and benchmarks; the executive never reads them."""
-        found = []
-        for point in p.getContactPoints(physicsClientId=self._client):
-            normal_force = point[9]
-            if normal_force <= 0.0:
-                continue
-            normal = np.array(point[7])
-            friction = point[10] * np.array(point[11]) + point[12] * np.array(point[13])
-            first, second = self._name(point[1], point[3]), self._name(point[2], point[4])
-            found.append(Contact(first, second, np.array(point[6]), normal * normal_force + friction, normal_force))
-        return found
+        return [
+            Contact(self._name(point[1], point[3]), self._name(point[2], point[4]), point)
+            for point in p.getContactPoints(physicsClientId=self._client)
+            if point[NORMAL_FORCE] > 0.0
+        ]
 
     def pressed(self, first: str, second: str) -> float:
         """True normal force in N between two things, for reports and benchmarks. Raises ValueError for a name that
@@ -179,7 +172,7 @@ class BulletPlant:
             if len(found) != 1:
                 raise ValueError(f"{len(found)} bodies are called {name!r}, expected one")
             bodies += found
-        return sum(point[9] for point in p.getContactPoints(*bodies, physicsClientId=self._client))
+        return sum(point[NORMAL_FORCE] for point in p.getContactPoints(*bodies, physicsClientId=self._client))
 
     def push(self, force: np.ndarray, link: str | None = None) -> None:
         """Apply a force (3,) in N, in W, during the next step: at the tool centre, or at the centre of mass of
@@ -246,17 +239,26 @@ class BulletPlant:
             add_visual_shape(shape, self._client, rgbaColor=color, **frame),
             list(pose[:3]),
             list(pose[3:]),
+            # As a multibody, PyBullet's default, a thing costs several times as much, and what the pads do against its
+            # turning never reaches the wrist sensor.
+            useMaximalCoordinates=True,
             physicsClientId=self._client,
         )
         if axes is not None:
-            moments = [mass * moment for moment in axes[1]]
-            p.changeDynamics(body, -1, localInertiaDiagonal=moments, collisionMargin=0.0, physicsClientId=self._client)
+            # Moments without the mass make a rigid body one of no mass.
+            p.changeDynamics(
+                body,
+                -1,
+                mass=mass,
+                localInertiaDiagonal=[mass * moment for moment in axes[1]],
+                physicsClientId=self._client,
+            )
         p.changeDynamics(
             body,
             -1,
             lateralFriction=friction,
-            rollingFriction=0.0,
-            spinningFriction=0.0,
+            rollingFriction=RESISTANCE if mass == 0.0 else 0.0,
+            spinningFriction=RESISTANCE,
             restitution=0.0,
             linearDamping=0.0,
             angularDamping=0.0,
@@ -276,12 +278,9 @@ class BulletPlant:
             0.0,
             (0.8, 0.8, 0.8, 1.0),
         )
-        base = scenario.robot.X_WB.translation
-        height = float(base[2]) - floor
-        if height > 0.0:
-            centre = np.array([base[0], base[1], floor + height / 2])
-            pedestal = Box((PEDESTAL_SIZE, PEDESTAL_SIZE, height))
-            self._add("pedestal", pedestal, SE3(np.eye(3), centre), FLOOR_FRICTION, 0.0, (0.4, 0.4, 0.4, 1.0))
+        block = pedestal(scenario)
+        if block is not None:
+            self._add("pedestal", *block, FLOOR_FRICTION, 0.0, (0.4, 0.4, 0.4, 1.0))
         table = scenario.table
         self._add("table", table.shape, table.X_WT, table.friction, 0.0, (0.75, 0.6, 0.45, 1.0))
         for region in scenario.regions.values():

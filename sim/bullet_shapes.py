@@ -31,10 +31,7 @@ def principal_axes(shape: Shape) -> tuple[SE3, np.ndarray] | None:
 
 
 def add_collision_shape(shape: Shape, client: int) -> int:
-    """The number of a new collision shape, a hull or compound in its principal frame.
-
-    A body made of one of these must be given a collision margin of zero: PyBullet puts the margin around a hull.
-    """
+    """The number of a new collision shape, a hull or compound in its principal frame."""
     match shape:
         case Box(size):
             return p.createCollisionShape(p.GEOM_BOX, halfExtents=[s / 2 for s in size], physicsClientId=client)
@@ -44,7 +41,9 @@ def add_collision_shape(shape: Shape, client: int) -> int:
             return p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=client)
         case Hull() | Compound():
             with _part_arrays(_octants(shape) if isinstance(shape, Hull) else _parts(shape), _R_OI(shape).T) as arrays:
-                return p.createCollisionShapeArray(**arrays, physicsClientId=client)
+                number = p.createCollisionShapeArray(**arrays, physicsClientId=client)
+            _take_margin_off(number, client)
+            return number
 
 
 def add_visual_shape(shape: Shape, client: int, **paint: Any) -> int:
@@ -68,6 +67,14 @@ def add_visual_shape(shape: Shape, client: int, **paint: Any) -> int:
                 physicsClientId=client,
                 **paint,
             )
+
+
+def _take_margin_off(number: int, client: int) -> None:
+    """PyBullet puts a margin of 1 mm around every hull, and takes it off the parts of a compound for a multibody only;
+    but the shape stays so for the bodies that are made of it later."""
+    body = p.createMultiBody(1.0, number, physicsClientId=client)
+    p.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
+    p.removeBody(body, physicsClientId=client)
 
 
 def _R_OI(shape: Shape) -> np.ndarray:

@@ -3,6 +3,7 @@
 The planner predicts with it and the executive observes into it; both see the same type.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -62,9 +63,9 @@ class SceneState:
 
 def pose_distance(X_WA: SE3, X_WB: SE3) -> tuple[float, float]:
     """Distance in metres and angle in rad between two poses."""
-    delta = X_WA.inverse() * X_WB
-    cosine = (np.trace(delta.rotation) - 1) / 2
-    return float(np.linalg.norm(delta.translation)), float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    cosine = (float(np.vdot(X_WA.rotation, X_WB.rotation)) - 1.0) / 2.0  # vdot(A, B) is the trace of Aᵀ B
+    distance = math.dist(X_WA.translation.tolist(), X_WB.translation.tolist())
+    return distance, math.acos(min(max(cosine, -1.0), 1.0))
 
 
 def floor_height(scenario: Scenario) -> float:

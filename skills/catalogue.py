@@ -4,12 +4,13 @@ from importlib.resources import files
 from pathlib import Path
 
 from skills.drag import Drag
+from skills.drag_aside import DragAside
 from skills.pick import Pick
 from skills.place import Place
 from skills.skill import Skill, Toolkit
 from skills.wipe import Wipe
 
-PRIMITIVES = (Pick, Place, Wipe, Drag)
+PRIMITIVES = (Pick, Place, Wipe, Drag, DragAside)
 
 
 def skills(toolkit: Toolkit) -> dict[str, Skill]:

@@ -46,4 +46,9 @@
     :precondition (and (in_bin ?o ?on) (stuck ?o) (hand_empty))
     :effect (and (graspable ?o) (away ?o))
   )
+  (:action drag_aside
+    :parameters (?o - solid ?on - tabletop)
+    :precondition (and (in_bin ?o ?on) (stuck ?o) (hand_empty))
+    :effect (and (away ?o) (not (graspable ?o)))
+  )
 )

@@ -1,61 +1,78 @@
-"""Drag: press on a flat object from above and slide it over the table's edge, so that it can be grasped there."""
+"""Drag: slide a flat object over the table's edge, where it can be grasped then."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-import pinocchio as pin
 from pinocchio import SE3
 from py_trees.behaviour import Behaviour
 
-from planner.failure import Blocked, MotionFailure, RefinementFailure
-from planner.refinement import Budget, Hints, Phase, Press, Refinement, pairs
+from planner.failure import MotionFailure, RefinementFailure
+from planner.refinement import Budget, Hints, Phase, Refinement
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Body, Table
-from scenarios.shapes import extents
-from sim.robot import GRAVITY
-from sim.scene import Held, SceneState, height_above
-from skills.conditions import Achieved
+from scenarios.shapes import reach
+from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
-from skills.motions import Follow, Open, Slide, Touch, guarded, sequence
-from skills.refine import PathFree, Refine
-from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, refine_by_sampling
-from skills.waypoints import raised, shifted
+from skills.pick import Pick
+from skills.pressing import Pressing, in_order
+from skills.skill import Toolkit, Unfit, beyond_reach, refine_by_sampling
+from skills.towing import (
+    EDGE_MARGIN,
+    Tips,
+    is_on_top,
+    margin_inside,
+    press_pose,
+    tip_points,
+    tow,
+    ways_of_pressing,
+    ways_to_press,
+)
+from skills.towing_tree import towing_tree
+from skills.waypoints import shifted
 
-HEIGHT = 0.08
-CLOSE = 0.015
-"""Metres above the surface from which contact is sought slowly."""
-
-PROBE = 0.012
-OVERHANGS = (0.055, 0.065, 0.045, 0.075)
+OVERHANGS = (0.06, 0.075, 0.09, 0.045)
 """Metres by which the object is to stand out beyond the edge: enough for the fingers' pads."""
 
-EDGE_MARGIN = 0.02
-"""Metres by which the centre of mass stays inside the edge."""
+SLANTS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
+"""Directions of drags off the edge's normal."""
 
-PRESS_OFFSETS = (0.0, -0.03, 0.03)
-YAWS = np.radians([0.0, 90.0, 45.0, -45.0, 180.0, -90.0])
+SHORTEST = 0.01
 LEFT_OVER = 0.3
 """Fraction of the overhang that may be missing after a drag."""
 
-FORCE_FACTOR = 2.5
-LEAST_FORCE = 6.0
-SPEED = 0.08
-TOUCH_SPEED = 0.015
-"""m/s: on something rigid, touchdown at 0.03 m/s peaks above 50 N."""
+MAX_TIPS = 8
+"""Ways to press that are tried for one end pose."""
 
-NEAR_SPEED = 0.15
+GRASP_BUDGET = Budget()
+DISCOURAGED = 0.1
+"""Metres of way that an edge's every failure counts for, in choosing among edges."""
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a drag ends: with `overhang` metres beyond the table's edge `edge` (0…3: +x, −x, +y, −y of the table),
+    along a way that is `slant` rad off the edge's normal."""
+
+    edge: int
+    overhang: float
+    slant: float
+
+    def pose(self, body: Body, X_WO: SE3, table: Table) -> SE3:
+        """The object's pose X_WO there."""
+        normal = edge_normal(table, self.edge)
+        left = np.array([-normal[1], normal[0], 0.0])
+        way = self.overhang - standing_out(body, X_WO, table, self.edge)
+        return shifted(X_WO, way * (normal + np.tan(self.slant) * left))
 
 
 @dataclass(frozen=True)
 class Pull:
-    """A drag: over the table's edge `edge` (0…3: +x, −x, +y, −y of the table), so far that `overhang` metres stand
-    out, pressing `press` metres before the object's centre, the hand turned by `yaw` rad about z."""
+    """A drag: where to, where the fingertips press, and how."""
 
-    edge: int
-    overhang: float
-    press: float
-    yaw: float
+    end: End
+    tips: Tips
+    pressing: Pressing
 
 
 def edge_normal(table: Table, edge: int) -> np.ndarray:
@@ -65,154 +82,166 @@ def edge_normal(table: Table, edge: int) -> np.ndarray:
     return table.X_WT.rotation @ local
 
 
-def travel(body: Body, X_WO: SE3, table: Table, pull: Pull) -> float:
-    """Metres along the edge's normal until `pull.overhang` of the object stands out."""
-    normal = edge_normal(table, pull.edge)
-    half = float(np.abs(normal @ X_WO.rotation) @ extents(body.shape)) / 2
-    inside = table.size[pull.edge // 2] / 2 - float((X_WO.translation - table.X_WT.translation) @ normal)
-    return inside + pull.overhang - half
+def standing_out(body: Body, X_WO: SE3, table: Table, edge: int) -> float:
+    """Metres by which the object at X_WO stands out beyond an edge; negative while it doesn't."""
+    normal = edge_normal(table, edge)
+    half = reach(body.shape, X_WO.rotation.T @ normal)
+    inside = table.size[edge // 2] / 2 - float((X_WO.translation - table.X_WT.translation) @ normal)
+    return half - inside
 
 
-def needed_force(body: Body, table: Table, pad_friction: float) -> float | None:
-    """Newtons with which to press so that friction takes the object along; None if no force suffices.
+def ends(body: Body, X_WO: SE3, table: Table, rng: np.random.Generator) -> list[list[tuple[float, End]]]:
+    """For every edge the poses that a drag may end in, with what each costs, in metres of way: the cheapest first.
 
-    Sliding with the hand needs f (µ_pad − µ_table) > µ_table m g, each µ the product of a pair.
+    The centre of mass stays above the table and the object leaves it on one side only.
     """
-    grip = pad_friction * body.friction
-    drag = table.friction * body.friction
-    if grip <= drag:
-        return None
-    return max(LEAST_FORCE, FORCE_FACTOR * drag * body.mass * GRAVITY / (grip - drag))
+    return [_ends_at(edge, body, X_WO, table, rng) for edge in range(4)]
 
 
-def pulls(body: Body, X_WO: SE3, table: Table, rng: np.random.Generator) -> Iterator[Pull]:
-    """Drags to every edge, the shortest way first; the centre of mass always stays above the table."""
+def _ends_at(edge: int, body: Body, X_WO: SE3, table: Table, rng: np.random.Generator) -> list[tuple[float, End]]:
     found = []
-    for edge in range(4):
-        normal = edge_normal(table, edge)
-        half = float(np.abs(normal @ X_WO.rotation) @ extents(body.shape)) / 2
-        for rank, overhang in enumerate(OVERHANGS):
-            if overhang > half - EDGE_MARGIN:
+    for rank, overhang in enumerate(OVERHANGS):
+        for slant in SLANTS:
+            end = End(edge, overhang, float(slant))
+            X_WO_end = end.pose(body, X_WO, table)
+            way = overhang - standing_out(body, X_WO, table, edge)
+            if way < SHORTEST or margin_inside(table, X_WO_end.translation) < EDGE_MARGIN:
                 continue
-            for offset in PRESS_OFFSETS:
-                for turn, yaw in enumerate(YAWS):
-                    pull = Pull(edge, overhang, offset, float(yaw))
-                    way = travel(body, X_WO, table, pull)
-                    if way <= 0.01 or half - overhang - offset < EDGE_MARGIN:
-                        continue
-                    cost = way + 0.05 * rank + 3.0 * abs(offset) + 0.02 * turn + 0.005 * rng.random()
-                    found.append((cost, len(found), pull))
-    found.sort(key=lambda entry: entry[:2])
-    for _, _, pull in found:
-        yield pull
+            if any(_leaves(body, X_WO, X_WO_end, table, other) for other in range(4) if other != edge):
+                continue
+            cost = way / np.cos(slant) + 0.02 * rank + 0.03 * rng.random()
+            found.append((float(cost), end))
+    return sorted(found, key=lambda entry: entry[0])
+
+
+def _leaves(body: Body, X_WO: SE3, X_WO_end: SE3, table: Table, edge: int) -> bool:
+    """Does the object stand out beyond an edge in the end, more than it does now?"""
+    now, then = (standing_out(body, X, table, edge) for X in (X_WO, X_WO_end))
+    return then > max(now, 0.0) + 1e-6
 
 
 class Drag:
-    """`drag(object, table)`: closed fingertips press on the object and take it along by friction."""
+    """`drag(object, table)`: fingertips press on the object and take it over an edge, where a grasp is found for it."""
 
     name = "drag"
     arity = 2
 
     def __init__(self, toolkit: Toolkit) -> None:
         self._kit = toolkit
+        self._pick = Pick(toolkit)
 
     def refine(
         self, action: GroundAction, scene: SceneState, rng: np.random.Generator, budget: Budget, hints: Hints
     ) -> Refinement | RefinementFailure:
         body = scene.scenario.bodies[action.args[0]]
-        table = scene.scenario.table
-        force = needed_force(body, table, self._kit.robot.gripper.pad_friction)
-        if force is None:
-            reason = "the fingertips have less friction on it than the table"
-            return RefinementFailure(action, reason, (Blocked(None, reason),))
-
-        def attempt(pull: Pull, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
-            return self._attempt(action, pull, world, force)
-
-        samples = pulls(body, scene.poses[body.name], table, rng)
-        return refine_by_sampling(action, scene, samples, attempt, budget, hints)
+        beyond = beyond_reach(self._kit, action, scene)
+        if beyond is not None:
+            return beyond
+        pressings = ways_of_pressing(self._kit, action, scene)
+        if isinstance(pressings, RefinementFailure):
+            return pressings
+        search = _Search(self._kit, self._pick, action, scene, rng)
+        samples = search.pulls(body, in_order(pressings, hints)[0])
+        outcome = refine_by_sampling(action, scene, samples, search.attempt, budget, hints)
+        if isinstance(outcome, RefinementFailure) and search.second_best is not None:
+            return search.second_best
+        return outcome
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
         name = refinement.action.args[0]
-        body, table = scene.scenario.bodies[name], scene.scenario.table
         pull: Pull = refinement.sample
-        way = travel(body, scene.poses[name], table, pull) * edge_normal(table, pull.edge)
-        end = refinement.phases[-1]
-        return replace(scene.moved(name, shifted(scene.poses[name], way)), q=end.trajectory.end, opening=0.0)
+        X_WO_end = pull.end.pose(scene.scenario.bodies[name], scene.poses[name], scene.scenario.table)
+        last = refinement.phases[-1]
+        return replace(scene.moved(name, X_WO_end), q=last.trajectory.end, opening=0.0)
 
     def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:
         name = run.action.args[0]
 
         def stands_out(scene: SceneState) -> bool:
-            pull = run.refinement.sample if run.refinement else None
+            pull: Pull | None = run.refinement.sample if run.refinement else None
+            if pull is None or name not in scene.poses:
+                return False
             body, table = scene.scenario.bodies[name], scene.scenario.table
-            return pull is not None and travel(body, scene.poses[name], table, pull) < LEFT_OVER * pull.overhang
+            out = standing_out(body, scene.poses[name], table, pull.end.edge)
+            return out > (1.0 - LEFT_OVER) * pull.end.overhang
 
-        motion = self._kit.motion
-        reach = sequence(
-            "to the object",
-            Open("close", run, context),
-            Follow("pre-drag", run, context),
-            Follow("approach", run, context),
-        )
-        contact = sequence("in contact", Touch("descend", run, context), Slide("drag", run, context))
-        return sequence(
-            str(run.action),
-            guarded("reach", Refine(run, context, motion), reach),
-            guarded("watched", PathFree(run, context, motion), contact),
-            Follow("retract", run, context),
-            Achieved(stands_out, run, context),
-        )
+        return towing_tree(self._kit.motion, run, context, self.predict, stands_out)
 
-    def _attempt(
-        self, action: GroundAction, pull: Pull, scene: SceneState, force: float
-    ) -> tuple[Phase, ...] | MotionFailure | Unfit:
-        name, surface = action.args[:2]
-        robot = self._kit.robot
-        body, table = scene.scenario.bodies[name], scene.scenario.table
-        X_WO = scene.poses[name]
-        normal = edge_normal(table, pull.edge)
-        top = np.array([0.0, 0.0, height_above(body.shape, X_WO.rotation)])
-        R_WG = pin.rpy.rpyToMatrix(np.pi, 0.0, pull.yaw)
-        X_WG_press = SE3(R_WG, X_WO.translation + top + normal * pull.press)
-        X_WG_end = shifted(X_WG_press, normal * travel(body, X_WO, table, pull))
-        low = raised(X_WG_press, -PROBE)
 
-        closed = replace(scene, opening=0.0)
-        along_with = Held(name, X_WG_press.inverse() * X_WO)
-        dragging = replace(closed, held=along_with)
-        touching = pairs(robot.finger_links, name)
-        sliding = touching | pairs(name, surface)
-        moved = closed.moved(name, shifted(X_WO, X_WG_end.translation - X_WG_press.translation))
-        waypoints = (
-            raised(X_WG_press, HEIGHT),
-            raised(X_WG_press, CLOSE),
-            X_WG_press,
-            low,
-            X_WG_press,
-            X_WG_end,
-            raised(X_WG_end, HEIGHT),
-        )
+@dataclass
+class _Search:
+    """One search for a drag: which ends have a grasp, and how often each edge has failed.
 
-        def lines(legs: Legs) -> tuple[Line, ...]:
-            down, near, probe, _, along, up = legs
-            return (
-                Line(dragging, along, SPEED, sliding),
-                Line(closed, down, NEAR_SPEED, touching),
-                Line(closed, np.vstack([near, probe[1:]]), TOUCH_SPEED, touching, checked=len(near)),
-                Line(moved, up, NEAR_SPEED, touching),
+    A drag counts only if a grasp is found where it ends. What else can be moved aside may still be in that grasp's
+    way: then the drag is `second_best`, for when there is no better one.
+    """
+
+    kit: Toolkit
+    pick: Pick
+    action: GroundAction
+    scene: SceneState
+    rng: np.random.Generator
+    second_best: Refinement | None = None
+    _failures: list[int] = field(default_factory=lambda: [0, 0, 0, 0])
+    _grasps: dict[tuple[End, frozenset[str]], RefinementFailure | None] = field(default_factory=dict)
+    _ungraspable: set[End] = field(default_factory=set)
+
+    def pulls(self, body: Body, pressing: Pressing) -> Iterator[Pull]:
+        """Samples, the edges by way and by how often they have failed."""
+        scene = self.scene
+        left = [entries[::-1] for entries in ends(body, scene.poses[body.name], scene.scenario.table, self.rng)]
+        while any(left):
+            edge = min(
+                (edge for edge in range(4) if left[edge]),
+                key=lambda edge: left[edge][-1][0] + DISCOURAGED * self._failures[edge],
             )
+            end = left[edge].pop()[1]
+            for tips in self._fitting(body, end):
+                yield Pull(end, tips, pressing)
+                if end in self._ungraspable:
+                    break
+            self._failures[edge] += 1
 
-        way = find_way(self._kit, waypoints, closed, lines)
-        if not isinstance(way, Way):
-            return way
-        along, down, probe, up = way.lines
-        press = Press(force, np.array(self._kit.contact.stiffness))
-        return (
-            Phase("close", "open", way.reach.standstill(scene.q), 0.0),
-            Phase("pre-drag", "move", way.reach, 0.0),
-            Phase("approach", "approach", down, 0.0, None, touching),
-            Phase("descend", "touch", probe, 0.0, None, sliding, press),
-            Phase("drag", "slide", along, 0.0, along_with, sliding, press),
-            Phase("retract", "approach", up, 0.0, None, sliding),
-        )
+    def attempt(self, pull: Pull, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
+        """The motion of one sample, or why there is none."""
+        name = self.action.args[0]
+        body, table, X_WO = world.scenario.bodies[name], world.scenario.table, world.poses[name]
+        X_WO_end = pull.end.pose(body, X_WO, table)
+        if not self._fits(body, X_WO, X_WO_end, pull.tips):
+            return Unfit("the fingertips would not stay on it, above the table")
+        missing = self._missing_grasp(pull, X_WO_end, world)
+        if missing is not None and not missing.culprit_sets:
+            self._ungraspable.add(pull.end)
+            return MotionFailure(f"it could not be grasped there: {missing.reason}")
+        phases = tow(self.kit, self.action, world, X_WO_end, pull.tips, pull.pressing)
+        if missing is None or not isinstance(phases, tuple):
+            return phases
+        self._ungraspable.add(pull.end)
+        if self.second_best is None:
+            self.second_best = Refinement(self.action, pull, phases)
+        return MotionFailure(f"something would be in the way of a grasp there: {missing.reason}")
+
+    def _missing_grasp(self, pull: Pull, X_WO_end: SE3, world: SceneState) -> RefinementFailure | None:
+        """None if a grasp is found where the drag ends, else why there is none."""
+        key = pull.end, frozenset(world.poses)
+        if key not in self._grasps:
+            picking = GroundAction(Pick.name, self.action.args[:2])
+            there = replace(world.moved(self.action.args[0], X_WO_end), opening=0.0)
+            found = self.pick.refine(picking, there, self.rng, GRASP_BUDGET, Hints())
+            self._grasps[key] = found if isinstance(found, RefinementFailure) else None
+        return self._grasps[key]
+
+    def _fitting(self, body: Body, end: End) -> list[Tips]:
+        X_WO = self.scene.poses[body.name]
+        X_WO_end = end.pose(body, X_WO, self.scene.scenario.table)
+        ways = ways_to_press(self.rng)
+        return [tips for tips in ways if self._fits(body, X_WO, X_WO_end, tips)][:MAX_TIPS]
+
+    def _fits(self, body: Body, X_WO: SE3, X_WO_end: SE3, tips: Tips) -> bool:
+        """Are the fingertips on the object all along, and above the table in the end?"""
+        X_WG = press_pose(body, X_WO, X_WO_end.translation - X_WO.translation, tips)
+        points = tip_points(X_WG, self.kit.robot.gripper)
+        if not is_on_top(body, X_WO, points):
+            return False
+        way = X_WO_end.translation - X_WO.translation
+        return min(margin_inside(self.scene.scenario.table, point + way) for point in points) >= EDGE_MARGIN

@@ -6,6 +6,7 @@ where every straight way leads past the dustpan's opening.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 
@@ -99,20 +100,20 @@ def cover(place: Place) -> list[Stroke]:
 
 
 def strokes_for(place: Place, name: str) -> Iterator[Stroke]:
-    """Strokes that take a crumb: the one of the cover first, then straight and bent ones, cheap and full ones first."""
+    """Strokes that take a crumb: the one of the cover first, then straight and bent ones by turns: what blocks all of a
+    kind may not block the other. Last come those that most likely take it."""
     k = place.crumbs.names.index(name)
     best = [stroke for stroke in cover(place) if place.taken(stroke)[k]]
-    straight = _in_order(place, [s for s in _directed(place, k) if place.taken(s)[k]])
+    fans = list(_directed(place, k))
+    straight = _by_turns([_in_order(place, [s for s in fan if place.taken(s)[k]]) for fan in fans])
     bent = _in_order(place, list(bent_strokes(place, k)))
-    yield from dict.fromkeys([*best, *_varied(straight, bent)])
+    likely = _by_turns([_in_order(place, [s for s in fan if place.taken(s, surely=False)[k]]) for fan in fans])
+    yield from dict.fromkeys([*best, *_by_turns([straight[::2], straight[1::2], bent]), *likely])
 
 
-def _varied(straight: list[Stroke], bent: list[Stroke]) -> Iterator[Stroke]:
-    """Two straight strokes for each bent one: what blocks all of one kind may not block the other."""
-    for i in range(max(len(straight), 2 * len(bent))):
-        yield from straight[i : i + 1]
-        if i % 2:
-            yield from bent[i // 2 : i // 2 + 1]
+def _by_turns(lists: Sequence[Sequence[Stroke]]) -> list[Stroke]:
+    """The first of each list, then the second of each, and so on."""
+    return [stroke for row in zip_longest(*lists) for stroke in row if stroke is not None]
 
 
 def _in_order(place: Place, strokes: list[Stroke]) -> list[Stroke]:
@@ -144,20 +145,21 @@ def _aligned(place: Place) -> Iterator[Stroke]:
                     yield from _fitted(place, heading, middle)
 
 
-def _directed(place: Place, k: int) -> Iterator[Stroke]:
-    """Straight strokes from a crumb to points along the opening, with the sponge at some offsets from the crumb."""
+def _directed(place: Place, k: int) -> Iterator[list[Stroke]]:
+    """For points along the opening, those nearest to square before the crumb first: straight strokes from the crumb,
+    with the sponge at some offsets from it."""
     crumbs, opening = place.crumbs, place.opening
     p, r = crumbs.p[k], float(crumbs.r[k])
-    reach = opening.half_width - r - SIDE_MARGIN
-    if reach < 0.0:
-        return
-    here = float(np.clip((p - opening.middle) @ opening.across, -reach, reach))
+    reach = max(0.0, opening.half_width - r - SIDE_MARGIN)
+    widest = max(0.0, opening.half_width - r / 2)
+    square = float(np.clip((p - opening.middle) @ opening.across, -widest, widest))
+    exits = [exit_ for exit_ in np.linspace(-reach, reach, EXITS) if abs(exit_ - square) > LATERAL_STEP]
     steps = int(max(place.tool.width / 2 - r - EDGE, 0.0) / LATERAL_STEP)
-    for exit_ in np.unique(np.append(np.linspace(-reach, reach, EXITS), here)):
+    for exit_ in [square, *sorted(exits, key=lambda exit_: abs(exit_ - square))]:
         way = opening.middle + opening.across * exit_ - p
         heading = float(np.arctan2(way[1], way[0]))
-        for step in range(-steps, steps + 1):
-            yield from _fitted(place, heading, float(p @ left(heading)) + step * LATERAL_STEP, k)
+        asides = [float(p @ left(heading)) + step * LATERAL_STEP for step in range(-steps, steps + 1)]
+        yield [stroke for aside in asides for stroke in _fitted(place, heading, aside, k)]
 
 
 def _fitted(place: Place, heading: float, aside: float, behind: int | None = None) -> Iterator[Stroke]:
@@ -187,7 +189,7 @@ def _long_enough(place: Place, stroke: Stroke) -> Stroke:
     _, needed = crossing_of(stroke, place.opening, where[before])
     furthest = float(needed.max(initial=float(middle[0]))) + OVERRUN
     if place.opening.is_edge:
-        furthest = min(furthest, float(middle[0]) + SUPPORT * place.tool.depth / 2)
+        furthest = min(furthest, float(middle[0]) + SUPPORT * place.tool.depth)
     return replace(stroke, last=furthest)
 
 

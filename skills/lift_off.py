@@ -14,6 +14,10 @@ HEIGHT = 0.05
 DURATION = 1.0
 PATIENCE = 2.0
 """Seconds after which the arm counts as stopped, wherever it is."""
+
+GIVING_WAY = 0.3
+"""Seconds for which an arm that was stopped by a push goes on giving way, before it holds stiffly again."""
+
 STEPS = 25
 DAMPING = 1e-3
 
@@ -36,8 +40,10 @@ class LiftOff(Behaviour):
             context.controller.hold()
 
     def update(self) -> Status:
-        waited = self._context.observation.t - self._since
-        return Status.SUCCESS if self._context.controller.finished or waited > PATIENCE else Status.RUNNING
+        controller, waited = self._context.controller, self._context.observation.t - self._since
+        if controller.stopped is not None and waited > GIVING_WAY:
+            controller.acknowledge()
+        return Status.SUCCESS if controller.finished or waited > PATIENCE else Status.RUNNING
 
 
 def straight_up(robot: RobotModel, q: np.ndarray, height: float, duration: float) -> Trajectory:

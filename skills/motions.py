@@ -207,5 +207,10 @@ def pressing(phase: Phase, context: SkillContext, until_contact: bool = False) -
     if press is None:
         raise ValueError(f"phase {phase.name!r} says no force to press with")
     return Reference(
-        phase.trajectory, context.contact_mode, np.array(press.stiffness), press.force, until_contact=until_contact
+        phase.trajectory,
+        context.contact_mode,
+        np.array(press.stiffness),
+        press.force,
+        until_contact=until_contact,
+        damping=press.damping,
     )

@@ -6,26 +6,29 @@ from dataclasses import replace
 import numpy as np
 from py_trees.behaviour import Behaviour
 
-from planner.failure import MotionFailure, RefinementFailure
+from planner.failure import Blocked, MotionFailure, RefinementFailure
 from planner.grasps import Grasp, grasps, open_width, tool_grasps
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
 from planner.support import supports
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Body
-from scenarios.shapes import bounding_radius
 from sim.robot import GRAVITY
 from sim.scene import Held, SceneState
+from skills.carrying import MAX_ACCELERATION
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Close, Follow, guarded, sequence
 from skills.refine import Refine
-from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, hand_would_hit, refine_by_sampling
+from skills.skill import Legs, Line, Toolkit, Unfit, Way, beyond_reach, find_way, hand_would_hit, refine_by_sampling
 from skills.waypoints import back_off, raised
 from skills.weigh import Weigh
 
 STANDOFF = 0.08
 LIFT = 0.10
 NEAR_SPEED = 0.12
+
+SAFETY = 1.5
+"""How much more weight than there is the fingers' friction has to bear for an object to be carried."""
 
 GRIP_FORCE = 70.0
 """Newtons with which each finger holds something hard."""
@@ -57,7 +60,8 @@ class Pick:
             return self._attempt(action, grasp, world)
 
         samples = self._grasps(action.args[0], scene, rng)
-        return refine_by_sampling(action, scene, samples, attempt, budget, hints)
+        nothing = f"no two sides of {action.args[0]} fit between the fingers"
+        return refine_by_sampling(action, scene, samples, attempt, budget, hints, nothing)
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
         name = refinement.action.args[0]
@@ -81,17 +85,19 @@ class Pick:
 
     def _impossible(self, action: GroundAction, scene: SceneState) -> RefinementFailure | None:
         """What no sample can help: an object beyond the stretched arm, or heavier than the fingers can hold."""
-        name, robot = action.args[0], self._kit.robot
+        beyond = beyond_reach(self._kit, action, scene)
+        if beyond is not None:
+            return beyond
+        name, gripper = action.args[0], self._kit.robot.gripper
         body = scene.scenario.bodies[name]
-        distance = float(np.linalg.norm(scene.poses[name].translation - robot.shoulder))
-        reach = robot.reach + bounding_radius(body.shape)
-        if distance > reach:
-            reason = f"{name} lies {distance:.2f} m from the shoulder, the arm reaches {reach:.2f} m"
-            return RefinementFailure(action, reason, proof="here")
-        liftable = 2 * robot.gripper.pad_friction * body.friction * robot.gripper.max_force / GRAVITY
-        if body.mass > liftable:
-            reason = f"{name} weighs {body.mass:.2f} kg, the fingers' friction holds {liftable:.2f} kg"
+        held = 2 * gripper.pad_friction * body.friction * gripper.max_force
+        if body.mass * GRAVITY > held:
+            reason = f"{name} weighs {body.mass:.2f} kg, the fingers' friction holds {held / GRAVITY:.2f} kg"
             return RefinementFailure(action, reason, proof="anywhere")
+        carried = held / (GRAVITY + MAX_ACCELERATION) / SAFETY
+        if body.mass > carried:
+            reason = f"{name} weighs {body.mass:.2f} kg, the fingers hold {carried:.2f} kg for sure while they carry"
+            return RefinementFailure(action, reason, (Blocked(None, reason),))
         return None
 
     def _grasps(self, name: str, scene: SceneState, rng: np.random.Generator) -> Iterator[Grasp]:

@@ -14,6 +14,7 @@ from planner.refinement import Budget, Hints, Phase, Refinement, pairs
 from planner.task.facts import place_of
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Region, Scenario, Table
+from scenarios.shapes import Shape, inscribed_radius
 from sim.scene import SceneState
 from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
@@ -48,6 +49,17 @@ def surfaces(scene: SceneState, place: str) -> list[Surface]:
     return found
 
 
+def wider_than(place: Region | Table, shape: Shape) -> str | None:
+    """In what way a shape can't lie in a container however it is turned: its inscribed ball about the centre, which is
+    to come to lie below the rim, doesn't fit between the walls. None if that is no obstacle."""
+    if not isinstance(place, Region) or place.open_side is not None:
+        return None
+    inner, ball = 2 * float(surface_of(place).half.min()), 2 * inscribed_radius(shape)
+    return (
+        None if ball <= inner else f"is {100 * ball:.1f} cm thick, which is more than the {100 * inner:.1f} cm inside"
+    )
+
+
 class Place:
     """`place(object, place)`: a release pose found by sampling; straight down to it, open, straight back."""
 
@@ -68,11 +80,15 @@ class Place:
             return self._attempt(action, placement, world)
 
         body = scene.scenario.bodies[name]
+        too_large = wider_than(place_named(scene.scenario, goal), body.shape)
+        if too_large is not None:
+            return RefinementFailure(action, f"{name} {too_large} {goal}", proof="anywhere")
         holding = (self._kit.robot.X_WG(scene.q), scene.held.X_GO)
         ways = [placements(body.shape, holding, surface, rng) for surface in surfaces(scene, goal)]
         drawn = (sample for turn in zip_longest(*ways) for sample in turn if sample is not None)
         samples = clear_first(drawn, body, standing_about(scene))
-        return refine_by_sampling(action, scene, samples, attempt, budget, hints)
+        nothing = f"{name}, as it is held, fits nowhere in {goal}"
+        return refine_by_sampling(action, scene, samples, attempt, budget, hints, nothing)
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
         end = refinement.phases[-1]

@@ -29,7 +29,7 @@ class Pressing:
     @property
     def press(self) -> Press:
         """What the controller is told."""
-        return Press(self.force, np.array(self.stiffness))
+        return Press(self.force, np.array(self.stiffness), self.damping)
 
 
 def in_order(variants: Sequence[Pressing], hints: Hints) -> list[Pressing]:

@@ -17,6 +17,7 @@ from planner.motion.motion_planner import MotionPlanner
 from planner.motion.trajectory import Trajectory
 from planner.refinement import Budget, Hints, Pair, Phase, Refinement, Refiner
 from planner.task.symbols import GroundAction
+from scenarios.shapes import bounding_radius
 from sim.robot import RobotModel
 from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
@@ -150,9 +151,23 @@ def find_way(
     return failure or Unfit("the arm can't follow the hand's path")
 
 
-def hand_would_hit(toolkit: Toolkit, scene: SceneState, X_WG: SE3, allowed: frozenset[Pair]) -> Unfit | None:
-    """What the hand at X_WG would hit, whatever the arm does; movable bodies are culprits if nothing else is hit."""
-    hits = toolkit.motion.hand_hits(scene, X_WG, allowed)
+def beyond_reach(toolkit: Toolkit, action: GroundAction, scene: SceneState) -> RefinementFailure | None:
+    """The failure, proven as the action's object lies, when the stretched arm does not come to it; else None."""
+    name, robot = action.args[0], toolkit.robot
+    distance = float(np.linalg.norm(scene.poses[name].translation - robot.shoulder))
+    reach = robot.reach + bounding_radius(scene.scenario.bodies[name].shape)
+    if distance <= reach:
+        return None
+    reason = f"{name} lies {distance:.2f} m from the shoulder, the arm reaches {reach:.2f} m"
+    return RefinementFailure(action, reason, proof="here")
+
+
+def hand_would_hit(
+    toolkit: Toolkit, scene: SceneState, X_WG: SE3, allowed: frozenset[Pair], margin: float | None = None
+) -> Unfit | None:
+    """What the hand at X_WG, with what it holds, would hit or come nearer to than `margin` metres, whatever the arm
+    does; movable bodies are culprits if nothing else is hit."""
+    hits = toolkit.motion.hand_hits(scene, X_WG, allowed, margin)
     if not hits:
         return None
     movable = hits & frozenset(scene.poses)
@@ -164,9 +179,15 @@ Attempt = Callable[[Any, SceneState], "tuple[Phase, ...] | MotionFailure | Unfit
 
 
 def refine_by_sampling(
-    action: GroundAction, scene: SceneState, samples: Iterable[Any], attempt: Attempt, budget: Budget, hints: Hints
+    action: GroundAction,
+    scene: SceneState,
+    samples: Iterable[Any],
+    attempt: Attempt,
+    budget: Budget,
+    hints: Hints,
+    nothing: str = "nothing can be tried with its shape where it lies",
 ) -> Refinement | RefinementFailure:
-    """Try samples in turn, hinted ones first, until one works or the budget is spent.
+    """Try samples in turn, hinted ones first, until one works or the budget is spent. `nothing`: why there may be none.
 
     A sample that fails is tried again without the other movable bodies; if it works then, those
     of them that its motion would have hit are its culprits.
@@ -188,7 +209,7 @@ def refine_by_sampling(
         if counted >= budget.tries or uncounted >= UNCOUNTED * budget.tries:
             break
     if not reasons:
-        return RefinementFailure(action, "there is nothing to sample from", (Blocked(None, "no sample"),))
+        return RefinementFailure(action, nothing, (Blocked(None, nothing),))
     common = max(reasons, key=lambda reason: reasons[reason])
     total = counted + uncounted
     reason = f"none of {total} samples works, most often because {common}"

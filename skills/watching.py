@@ -56,7 +56,7 @@ class Watch:
             return None
         for ahead, start in self._ahead(phase, since):
             seen = replace(scene, opening=ahead.opening, held=ahead.held)
-            failure = self._motion.audit(seen, ahead.trajectory, ahead.allowed, since=start)
+            failure = self._motion.audit(seen, ahead.trajectory, ahead.allowed, since=start, only=frozenset(stirred))
             if failure is not None:
                 return failure
         self._looked_at = scene.poses

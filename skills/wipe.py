@@ -4,29 +4,32 @@ A sample is a stroke and how it presses. Each wipe is one stroke; `skills.gather
 as possible take all the crumbs that are seen on the surface.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from pinocchio import SE3
 from py_trees.behaviour import Behaviour
 
 from planner.failure import Blocked, MotionFailure, RefinementFailure
-from planner.refinement import Budget, Hints, Phase, Refinement, pairs
+from planner.motion.world import movables
+from planner.refinement import Budget, Hints, Pair, Phase, Refinement, pairs
 from planner.task.facts import place_of
 from planner.task.symbols import GroundAction
 from scenarios.regions import interior
-from scenarios.shapes import Box, Shape, extents
+from scenarios.shapes import Box, Compound, Hull, Shape, bounding_radius, extents, middle, reach
 from sim.scene import Held, SceneState
 from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.gathering import Place, strokes_for
 from skills.motions import Follow, Slide, Touch, guarded, sequence
+from skills.pick import grip_force
 from skills.pressing import Pressing, in_order
 from skills.refine import PathFree, Refine
 from skills.skill import ContactSettings, Legs, Line, Toolkit, Unfit, Way, find_way, refine_by_sampling
-from skills.strokes import Crumbs, Stroke, Tool, along, left, opening_of, top_of
+from skills.strokes import Crumbs, Opening, Stroke, Tool, along, left, opening_of, top_of
 from skills.waypoints import raised, shifted
 
 HEIGHT = 0.08
@@ -36,29 +39,38 @@ CLOSE = 0.015
 PROBE = 0.015
 """Metres below the surface down to which touchdown is sought."""
 
+HOLD_SHARE = 0.6
+"""Share of what the grip on the sponge bears that is used when it is to be pressed harder."""
+
+LOOK = 0.02
+"""Metres between the poses of the hand at which a stroke is looked at before a way for the arm is sought."""
+
 TOUCH_SPEED = 0.03
 NEAR_SPEED = 0.15
 
 
 @dataclass(frozen=True)
 class Wiping:
-    """A stroke, how it presses, and whether the sponge is turned half round."""
+    """A stroke, and how it presses."""
 
     stroke: Stroke
     pressing: Pressing
-    flipped: bool = False
 
 
-def pressings(contact: ContactSettings) -> list[Pressing]:
-    """How a stroke may press: as set; harder and slower, for what a soft sponge passes over; lighter and slower, for
-    what it sticks to; slower, for what rolls away; and stiffer, for what holds it up."""
+def pressings(contact: ContactSettings, hold: float) -> list[Pressing]:
+    """How a stroke may press: as set; lighter and slower, for what it sticks to; harder and slower, for what a soft
+    sponge passes over; slower, for what rolls away; and stiffer, for what holds it up.
+
+    `hold`: N along the pads that the grip on the sponge bears. Pressed nearly as hard, it creeps up in the hand.
+    """
     usual = Pressing(contact.force, contact.speed, tuple(contact.stiffness))
+    harder = float(np.clip(HOLD_SHARE * hold / contact.force, 1.0, 2.0))
     return [
         usual,
-        usual.varied(force=2.0, speed=0.5),
         usual.varied(force=0.5, speed=0.5),
+        usual.varied(force=harder, speed=0.5),
         usual.varied(speed=0.3),
-        usual.varied(stiffness=2.0, speed=0.5),
+        usual.varied(stiffness=2.0, damping=1.5, speed=0.5),
     ]
 
 
@@ -82,10 +94,23 @@ class Wipe:
             reason = f"a rim of {action.args[2]} stands above the surface"
             return RefinementFailure(action, reason, (Blocked(None, reason),), proof="anywhere")
 
-        def attempt(wiping: Wiping, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
-            return self._attempt(action, wiping, place, world)
+        refused: set[Stroke] = set()
 
-        samples = self._samples(action.args[0], place, scene, held, hints)
+        def attempt(wiping: Wiping, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
+            outcome = self._attempt(action, wiping, place, world)
+            if not isinstance(outcome, tuple):
+                refused.add(wiping.stroke)
+            return outcome
+
+        sponge = scene.scenario.bodies[held.name]
+        hold = 2 * self._kit.robot.gripper.pad_friction * sponge.friction * grip_force(sponge)
+        strokes = list(strokes_for(place, action.args[0]))
+        samples = (
+            Wiping(stroke, pressing)
+            for pressing in in_order(pressings(self._kit.contact, hold), hints)
+            for stroke in strokes
+            if stroke not in refused
+        )
         return refine_by_sampling(action, scene, samples, attempt, budget, hints)
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
@@ -98,7 +123,7 @@ class Wipe:
         swept = {crumb, *(name for name, is_taken in zip(place.crumbs.names, mask, strict=True) if is_taken)}
         lower, upper = interior(scene.scenario.regions[pan])
         for name, spot in zip(sorted(swept), _spots(lower, upper, len(swept)), strict=True):
-            spot[2] = lower[2] + float(extents(scene.scenario.bodies[name].shape)[2]) / 2
+            spot[2] = lower[2] + reach(scene.scenario.bodies[name].shape, np.array([0.0, 0.0, -1.0]))
             after = after.moved(name, SE3(np.eye(3), scene.scenario.regions[pan].X_WR.act(spot)))
         return after
 
@@ -135,33 +160,34 @@ class Wipe:
         tool = Tool(grip.width, grip.depth, grip.width + 2 * gripper.pad[1])
         return Place(scenario.table, tool, opening, Crumbs(names, positions, radii))
 
-    def _samples(self, crumb: str, place: Place, scene: SceneState, held: Held, hints: Hints) -> Iterator[Wiping]:
-        """Strokes with the pressing that is tried first, then all of them with the next one."""
-        R_WO = self._kit.robot.X_WG(scene.q).rotation @ held.X_GO.rotation
-        grip = _Broadside.of(scene.scenario.bodies[held.name].shape, held)
-        strokes = list(strokes_for(place, crumb))
-        for pressing in in_order(pressings(self._kit.contact), hints):
-            for stroke in strokes:
-                # A soft thing turns in the hand when it is swung about: the way round that is nearer comes first.
-                turns = [float(np.trace(R_WO.T @ grip.turned(stroke.heading, flip))) for flip in (False, True)]
-                nearer = turns[1] > turns[0]
-                yield Wiping(stroke, pressing, nearer)
-                yield Wiping(stroke, pressing, not nearer)
-
     def _attempt(
         self, action: GroundAction, wiping: Wiping, place: Place, scene: SceneState
     ) -> tuple[Phase, ...] | MotionFailure | Unfit:
-        crumb, surface, pan = action.args[:3]
         held = scene.held
         assert held is not None
-        stroke, pressing = wiping.stroke, wiping.pressing
-        if not place.taken(stroke)[place.crumbs.names.index(crumb)]:
+        stroke = wiping.stroke
+        if not place.taken(stroke, surely=False)[place.crumbs.names.index(action.args[0])]:
             return Unfit("the crumb does not lie before the stroke")
         if place.comes_down_on(stroke):
             return Unfit("the sponge would come down on a crumb")
+        # A soft thing turns in the hand when it is swung about: the way round that is nearer comes first.
+        R_WO = self._kit.robot.X_WG(scene.q).rotation @ held.X_GO.rotation
+        grip = _Broadside.of(scene.scenario.bodies[held.name].shape, held)
+        ways = sorted((False, True), key=lambda flip: -float(np.trace(R_WO.T @ grip.turned(stroke.heading, flip))))
+        outcome = self._pushed(action, wiping, place.opening, scene, ways[0])
+        return self._pushed(action, wiping, place.opening, scene, ways[1]) if isinstance(outcome, Unfit) else outcome
+
+    def _pushed(
+        self, action: GroundAction, wiping: Wiping, opening: Opening, scene: SceneState, flipped: bool
+    ) -> tuple[Phase, ...] | MotionFailure | Unfit:
+        """The stroke as motion, the sponge as it is or turned half round."""
+        _, surface, pan = action.args[:3]
+        held = scene.held
+        assert held is not None
+        stroke, pressing = wiping.stroke, wiping.pressing
         robot, contact = self._kit.robot, self._kit.contact
         crumbs = _crumbs(scene, robot.gripper.min_grasp_extent)
-        X_WG_start, *X_WG_course = _hand_poses(scene, held, wiping)
+        X_WG_start, *X_WG_course = _hand_poses(scene, held, stroke, flipped)
         back, height = contact.pre_wipe or (0.0, HEIGHT)
         ahead = np.array([*along(stroke.heading), 0.0])
         X_WG_pre = shifted(X_WG_start, np.array([0.0, 0.0, height]) - back * ahead)
@@ -170,9 +196,12 @@ class Wipe:
         pressed = scene.without(crumbs)
         gripping = pairs(robot.finger_links, held.name)
         touching = gripping | pairs(held.name, surface)
-        if not place.opening.is_edge:
+        if not opening.is_edge:
             touching |= pairs(held.name, pan)
         sweeping = touching | pairs(robot.finger_links | {held.name}, crumbs) if crumbs else touching
+        blocked = self._hits(pressed, [X_WG_start, *X_WG_course], touching)
+        if blocked is not None:
+            return blocked
         near, up = raised(X_WG_start, CLOSE), raised(X_WG_course[-1], HEIGHT)
         waypoints = (X_WG_pre, near, X_WG_start, low, X_WG_start, *X_WG_course, up)
 
@@ -199,16 +228,29 @@ class Wipe:
             Phase("retract", "approach", up, scene.opening, held, sweeping),
         )
 
+    def _hits(self, scene: SceneState, poses: Sequence[SE3], allowed: frozenset[Pair]) -> Unfit | None:
+        """What hand and sponge would hit on the way through poses X_WG, whatever the arm does."""
+        hits = frozenset[str]()
+        for X_WG in _between(poses):
+            hits |= self._kit.motion.hand_hits(scene, X_WG, allowed)
+        if not hits:
+            return None
+        movable = hits & movables(scene)
+        reason = "the stroke leads through " + ", ".join(sorted(hits - movable or hits))
+        return Unfit(reason, movable if movable == hits else frozenset())
+
 
 @dataclass(frozen=True)
 class _Broadside:
     """How a held tool lies to its course: unit columns in O of its front (along its longest level axis), the course
-    and up; its width and depth in metres."""
+    and up; its width and depth in metres, and how far it reaches below its origin. p_OM (3,): where the middle of its
+    bounding box lies from the origin."""
 
     basis_O: np.ndarray
     width: float
     depth: float
-    half_height: float
+    below: float
+    p_OM: np.ndarray
 
     @staticmethod
     def of(shape: Shape, held: Held) -> "_Broadside":
@@ -222,7 +264,7 @@ class _Broadside:
         z_O = -np.sign(approach_O[down]) * np.eye(3)[down]
         y_O = np.eye(3)[longest]
         basis_O = np.column_stack([np.cross(y_O, z_O), y_O, z_O])
-        return _Broadside(basis_O, float(size[longest]), float(size[other]), float(size[down]) / 2)
+        return _Broadside(basis_O, float(size[longest]), float(size[other]), reach(shape, -z_O), middle(shape))
 
     def turned(self, heading: float, flipped: bool) -> np.ndarray:
         """Rotation R_WO of the tool broadside to a heading."""
@@ -231,16 +273,28 @@ class _Broadside:
         return np.column_stack([[*x, 0.0], [*y, 0.0], [0.0, 0.0, 1.0]]) @ self.basis_O.T
 
 
-def _hand_poses(scene: SceneState, held: Held, wiping: Wiping) -> list[SE3]:
+def _hand_poses(scene: SceneState, held: Held, stroke: Stroke, flipped: bool) -> list[SE3]:
     """Poses X_WG of the hand along the stroke, the sponge standing on the table."""
     grip = _Broadside.of(scene.scenario.bodies[held.name].shape, held)
-    height = top_of(scene.scenario.table) + grip.half_height
+    height = top_of(scene.scenario.table) + grip.below
     X_OG = held.X_GO.inverse()
     poses = []
-    for front, heading in wiping.stroke.course():
+    for front, heading in stroke.course():
         centre = front - along(heading) * grip.depth / 2
-        poses.append(SE3(grip.turned(heading, wiping.flipped), np.array([*centre, height])) * X_OG)
+        R_WO = grip.turned(heading, flipped)
+        poses.append(SE3(R_WO, np.array([*(centre - (R_WO @ grip.p_OM)[:2]), height])) * X_OG)
     return poses
+
+
+def _between(poses: Sequence[SE3]) -> Iterator[SE3]:
+    """Poses at most LOOK metres apart along a polyline, its ends included."""
+    yield poses[0]
+    for X_WA, X_WB in pairwise(poses):
+        steps = int(np.ceil(float(np.linalg.norm(X_WB.translation - X_WA.translation)) / LOOK))
+        for k in range(1, steps + 1):
+            share = k / steps
+            p = X_WA.translation + share * (X_WB.translation - X_WA.translation)
+            yield SE3(X_WB.rotation, p)
 
 
 def _spots(lower: np.ndarray, upper: np.ndarray, count: int) -> list[np.ndarray]:
@@ -256,6 +310,8 @@ def _radius(shape: Shape) -> float:
     """Metres of the circle about a crumb's footprint, whichever side it lies on."""
     if isinstance(shape, Box):
         return float(np.linalg.norm(np.sort(shape.size)[1:])) / 2
+    if isinstance(shape, Hull | Compound):
+        return bounding_radius(shape)
     return float(extents(shape).max()) / 2
 
 

@@ -3,25 +3,29 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from py_trees.trees import BehaviourTree
 from rich.console import Console
 from rich.table import Table
 
 from bt_tamp.bench.checks import Check, at_least, at_most
 from bt_tamp.bench.stopwatch import Stopwatch
-from bt_tamp.executive.build import CONTROL_EVERY, TREE_EVERY, Machine, build
+from bt_tamp.executive.build import CONTROL_EVERY, Machine, build
+from bt_tamp.executive.loop import Audits, Tally, act, look
 from bt_tamp.options import RunOptions
+from bt_tamp.report.folder import RunFolder
+from bt_tamp.report.recorder import RunRecorder
 from scenarios.load import load_scenario
-from sim.plant import Command
 
 SCENE = "fig1_wipe"
 WIPING = frozenset({"touch", "slide"})
 FREE = frozenset({"move", "approach"})
 
 CONTROL_PARTS = ("model", "state", "law", "QP build", "solve", "command")
-PARTS = ("observe", *CONTROL_PARTS, "apply", "tree", "drive", "physics")
-"""In the order of a tick. drive: torques and the fingers' gear given to the engine; physics: the engine's bare step."""
+PARTS = ("observe", *CONTROL_PARTS, "apply", "record", "tree", "drive", "physics")
+"""record: signals taken down and true contacts judged. drive: torques and the fingers' gear given to the engine.
+physics: the engine's bare step."""
 
 THINKING = 0.05
 """CPU seconds beyond which a tick of the tree has planned: left out, as planning isn't control."""
@@ -55,53 +59,32 @@ class Cost:
 
 
 def measure(seed: int) -> list[Cost]:
-    """Clear SCENE's table until enough was seen of moving freely and of wiping.
+    """Clear SCENE's table, recorded like any run, until enough was seen of moving freely and of wiping.
 
     Raises ValueError if no stroke comes within LONGEST simulated seconds.
     """
-    machine = build(load_scenario(SCENE, seed), RunOptions(seed=seed), _ignore, _ignore)
-    watches = {"free": Stopwatch(), "wiping": Stopwatch(), "": Stopwatch()}
+    scenario = load_scenario(SCENE, seed)
+    machine = build(scenario, RunOptions(seed=seed), _ignore, _ignore)
+    audits, tally = Audits.of(machine), Tally()
+    watches = {regime: Stopwatch(longest=THINKING) for regime in ("free", "wiping", "")}
     spent = {regime: [0.0, 0.0] for regime in watches}
-    tree = BehaviourTree(machine.mission.root)
-    tick = 0
-    while machine.context.observation.t < LONGEST and min(spent[r][0] for r in ("free", "wiping")) < ENOUGH:
-        regime = _regime(machine)
-        before = time.thread_time()
-        thought = _tick(machine, tree, tick, watches[regime])
-        spent[regime][0] += CONTROL_EVERY * machine.plant.timestep
-        spent[regime][1] += time.thread_time() - before - thought
-        tick += 1
+    n = 0
+    with TemporaryDirectory() as folder, RunRecorder(scenario, RunFolder(Path(folder))) as recorder:
+        while tally.t < LONGEST and min(spent[r][0] for r in ("free", "wiping")) < ENOUGH:
+            regime = _regime(machine)
+            machine.plant.lap = machine.context.controller.lap = watches[regime].lap
+            before = time.thread_time()
+            watches[regime].start()
+            look(machine, tally, n)
+            looked = time.thread_time()
+            act(machine, recorder, audits, tally, n)
+            spent[regime][0] += CONTROL_EVERY * machine.plant.timestep
+            spent[regime][1] += time.thread_time() - (looked if looked - before > THINKING else before)
+            n += 1
     machine.plant.close()
     if not spent["wiping"][0]:
         raise ValueError(f"{SCENE}, seed {seed}: no stroke within {LONGEST:g} simulated seconds")
     return [_cost(regime, watches[regime], *spent[regime]) for regime in ("free", "wiping")]
-
-
-def _tick(machine: Machine, tree: BehaviourTree, tick: int, watch: Stopwatch) -> float:
-    """One control period, as the executive's loop does it. Returns the CPU seconds that were spent on planning."""
-    plant, context = machine.plant, machine.context
-    plant.lap = context.controller.lap = watch.lap
-    thought = 0.0
-    watch.start()
-    observation = plant.observe()
-    context.observation = observation
-    watch.lap("observe")
-    if tick % TREE_EVERY == 0:
-        begun = time.thread_time()
-        context.scene = machine.belief.update(observation, context.grip.is_closing)
-        tree.tick()
-        took = time.thread_time() - begun
-        if took > THINKING:
-            thought = took
-            watch.start()
-        else:
-            watch.lap("tree")
-    tau = context.controller.update(observation)
-    plant.apply(Command(tau, context.grip.command(observation)))
-    watch.lap("apply")
-    for _ in range(CONTROL_EVERY):
-        plant.step()
-    return thought
 
 
 def _regime(machine: Machine) -> str:

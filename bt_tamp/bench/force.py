@@ -2,11 +2,10 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import groupby, product
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from bt_tamp.bench.checks import Check, at_most
 from bt_tamp.bench.scene import SPONGE, Truth, believed
@@ -120,34 +119,39 @@ def about_100_newtons() -> str:
     )
 
 
+COLUMNS = (
+    ("target", "N", 6, lambda r: f"{r.target:.0f}"),
+    ("mean", "%", 7, lambda r: f"{100 * (r.mean / r.target - 1):+.1f}"),
+    ("RMS", "%", 6, lambda r: f"{100 * r.rms / r.target:.1f}"),
+    ("peak", "N", 6, lambda r: f"{r.peak:.1f}"),
+    ("overshoot", "%", 10, lambda r: f"{100 * r.overshoot:.0f}"),
+    ("airborne", "ms", 9, lambda r: f"{1000 * r.airborne:.0f}"),
+    ("path", "mm", 7, lambda r: f"{1000 * r.path:.2f}"),
+    ("slip", "mm", 7, lambda r: f"{1000 * r.slip:.2f}"),
+    ("QP", "µs", 5, lambda r: f"{r.qp_us:.0f}"),
+    ("fallbacks", "", 10, lambda r: str(r.fallbacks)),
+)
+"""Heading, unit, width and text of each figure in the table."""
+
+
 def print_results(console: Console, results: Sequence[SlideResult]) -> None:
-    """The table: one line a slide."""
-    table = Table(
-        caption="true normal force from 0.5 s after touchdown to the command to lift; overshoot in those 0.5 s",
-        caption_justify="left",
-    )
-    table.add_column("case", overflow="fold", max_width=34)
-    table.add_column("law")
-    units = ("N", "%", "%", "N", "%", "ms", "mm", "mm", "µs", "")
-    names = ("target", "mean off", "RMS", "peak", "overshoot", "no contact", "path", "slip", "QP", "fallbacks")
-    for name, unit in zip(names, units, strict=True):
-        table.add_column(f"{name}\n{unit}", justify="right")
-    table.add_column("ended")
-    for r in results:
-        numbers = (
-            f"{r.target:.0f}",
-            f"{100 * (r.mean / r.target - 1):+.1f}",
-            f"{100 * r.rms / r.target:.1f}",
-            f"{r.peak:.1f}",
-            f"{100 * r.overshoot:.0f}",
-            f"{1000 * r.airborne:.0f}",
-            f"{1000 * r.path:.2f}",
-            f"{1000 * r.slip:.2f}",
-            f"{r.qp_us:.0f}",
-            str(r.fallbacks),
-        )
-        table.add_row(r.case, r.law, *numbers, r.ended)
-    console.print(table)
+    """The table, narrow enough for any terminal: a line for each target below what was slid with."""
+    lines = ["".join(f"{name:>{width}}" for name, _, width, _ in COLUMNS)]
+    lines.append("".join(f"{unit:>{width}}" for _, unit, width, _ in COLUMNS))
+    for (case, law), slides in groupby(sorted(results, key=_group(results)), key=lambda r: (r.case, r.law)):
+        lines.append(f"{case}, {law}")
+        for r in slides:
+            ended = "" if r.ended == "done" else f"  {r.ended}"
+            lines.append("".join(f"{text(r):>{width}}" for _, _, width, text in COLUMNS) + ended)
+    lines.append("mean (off by), RMS: true normal force from 0.5 s after touchdown to the command to lift")
+    lines.append("overshoot: of the target, within those 0.5 s; airborne: time without contact since touchdown")
+    console.print("\n".join(lines), highlight=False, markup=False, soft_wrap=True)
+
+
+def _group(results: Sequence[SlideResult]) -> Callable[[SlideResult], int]:
+    """A key that keeps slides of one case and law together, in the order in which these came first."""
+    order = list(dict.fromkeys((r.case, r.law) for r in results))
+    return lambda r: order.index((r.case, r.law))
 
 
 def thinned(result: SlideResult, every: int = 5) -> SlideResult:

@@ -56,9 +56,10 @@ class SlideResult:
     command to lift unless said otherwise.
 
     mean, rms (of force − target), peak: N, the peak from touchdown on. overshoot: (largest force in the first
-    SETTLING seconds − target) / target. airborne: seconds without contact. path: largest distance in the plane
-    of the table between the tool and where it should be, in m. slip: m that the sponge moved in the hand. qp_us:
-    median time to build and solve a QP. violations: ticks beyond a torque limit. ended: "done", or how it failed.
+    SETTLING seconds − target) / target. airborne: seconds without contact since touchdown, bounces included. path:
+    largest distance in the plane of the table between the tool and where it should be, in m. slip: m that the
+    sponge moved in the hand. qp_us: median time to build and solve a QP.
+    violations: ticks beyond a torque limit. ended: "done", or how it failed.
     """
 
     case: str
@@ -170,7 +171,7 @@ def _judge(case: Case, rig: Rig, log: _Log, slip: float, ended: str) -> SlideRes
         rms=float(np.sqrt(np.mean((later - case.target) ** 2))),
         peak=float(max(at_first.max(), later.max())),
         overshoot=float(at_first.max() / case.target - 1.0),
-        airborne=float(np.sum(later < BREAK) * rig.period),
+        airborne=float((np.sum(later < BREAK) + np.sum(at_first < BREAK)) * rig.period),
         path=max(log.path, default=float("nan")),
         slip=slip,
         qp_us=rig.qp_us(),

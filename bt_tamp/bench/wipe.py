@@ -1,185 +1,77 @@
-"""`bench wipe`: random crumbs on a table with a dustpan on any of its sides, to be wiped into it by whole runs."""
+"""`bench wipe`: random crumbs, the dustpan on each side of the table in turn, wiped into it by whole runs."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-import pinocchio as pin
-from pinocchio import SE3
+from rich.console import Console
+from rich.table import Table
 
+from bt_tamp.bench.checks import Check, at_least
+from bt_tamp.bench.crumbs import COUNT, GRAIN_COUNT, GRAINS, PAN, SPONGE, Layout, cubes, grains
 from bt_tamp.executive.loop import run_scenario
 from bt_tamp.options import RunOptions
 from bt_tamp.report.events import Event
 from bt_tamp.report.recorder import RunRecorder
-from scenarios.regions import OUTWARD
-from scenarios.scenario import Body, OpenSide, Region, RobotPlacement, Scenario, Table
-from scenarios.shapes import Box
-from sim.robot import RobotModel
 
-COUNT = 50
-GRAIN_COUNT = 10
-QUICK = 4
-GRAIN_QUICK = 1
-SEED = 5
+QUICK, GRAIN_QUICK = 4, 1
+"""Layouts of a first look."""
+
 MAX_SIM_TIME = 400.0
+CUBES_WANTED, GRAINS_WANTED = 98.0, 95.0
+"""Percent of all crumbs that are to lie in the dustpan."""
 
-GRAINS = 60
-MOST_CUBES = 12
-CUBES = (0.01, 0.0299)
-"""Metres: what is 3 cm or more can be grasped and is no crumb."""
-
-GRAIN_SIZES = (0.006, 0.008)
-DENSITY = 600.0
-FRICTION = 0.4
-APART = 0.002
-"""Metres between two crumbs, at least."""
-
-PAN = "dustpan"
-SPONGE = "sponge"
-TOP, PLATE = 0.05, 0.1
-"""Metres: the plate reaches below the dustpan's floor, so that nothing slides back out under the table."""
-
-PAN_SIZE = (0.28, 0.15, 0.055)
-"""Metres along the table's edge, away from it, and up; its rims lie 3 cm below the table's top."""
-
-RIMS_BELOW = 0.03
-HOME = np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 80.0, 0.0])
+REAL_TIME_WANTED = 3.0
 
 
-@dataclass(frozen=True)
-class Side:
-    """A table with a dustpan at one of its edges, placed so that the arm can work there: x and y in W, metres.
-
-    table: x and y from and to. crumbs: the same of where they lie. pan: middle of its opening along the edge. sponge:
-    where it lies on the table.
-    """
-
-    table: tuple[float, float, float, float]
-    crumbs: tuple[float, float, float, float]
-    pan: float
-    sponge: tuple[float, float]
+def planned(quick: bool) -> list[Layout]:
+    """The layouts of cubes, then those of grains."""
+    return [*cubes(QUICK if quick else COUNT), *grains(GRAIN_QUICK if quick else GRAIN_COUNT)]
 
 
-SIDES: Mapping[OpenSide, Side] = {
-    "-y": Side((0.40, 0.84, -0.28, 0.42), (0.50, 0.76, -0.18, 0.12), 0.64, (0.60, 0.32)),
-    "+x": Side((0.34, 0.74, -0.42, 0.42), (0.48, 0.68, -0.15, 0.15), 0.0, (0.56, 0.32)),
-    "+y": Side((0.40, 0.84, -0.42, 0.28), (0.50, 0.76, -0.12, 0.18), 0.64, (0.60, -0.32)),
-    "-x": Side((0.48, 0.88, -0.42, 0.42), (0.53, 0.71, -0.15, 0.15), 0.0, (0.64, 0.32)),
-}
-"""By the side of the table on which the dustpan is."""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Crumbs on a table: the side of the dustpan, edges of the cubes (m), and x, y (m) and yaw (rad) of each, in W."""
-
-    side: OpenSide
-    edges: tuple[float, ...]
-    poses: tuple[tuple[float, float, float], ...]
-
-    def scenario(self) -> Scenario:
-        """The scene: table, dustpan, sponge and crumbs. All crumbs are to lie in the dustpan."""
-        side = SIDES[self.side]
-        x0, x1, y0, y1 = side.table
-        middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2, TOP - PLATE / 2])
-        table = Table((x1 - x0, y1 - y0, PLATE), SE3(np.eye(3), middle), 0.5)
-        crumbs = {
-            f"crumb_{index:02d}": _crumb(edge, pose)
-            for index, (edge, pose) in enumerate(zip(self.edges, self.poses, strict=True))
-        }
-        goal = " ".join(f"(in_bin {name} {PAN})" for name in crumbs)
-        placement = RobotPlacement(RobotModel().name, SE3.Identity(), HOME)
-        pan = _pan(self.side, table)
-        return Scenario("wipe", 0, placement, table, {PAN: pan}, {}, {**crumbs, SPONGE: _sponge(side)}, f"(and {goal})")
-
-
-def _crumb(edge: float, pose: tuple[float, float, float]) -> Body:
-    x, y, yaw = pose
-    X_WO = SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw), np.array([x, y, TOP + edge / 2]))
-    return Body("crumb", Box((edge, edge, edge)), DENSITY * edge**3, FRICTION, (0.97, 0.5, 0.0, 1.0), X_WO)
-
-
-def _sponge(side: Side) -> Body:
-    return Body(
-        name=SPONGE,
-        shape=Box((0.09, 0.06, 0.04)),
-        mass=0.06,
-        friction=0.5,
-        color=(0.95, 0.76, 0.2, 1.0),
-        X_WO=SE3(np.eye(3), np.array([*side.sponge, TOP + 0.02])),
-        tool="sponge",
-        contact_stiffness=2000.0,
-        contact_damping=20.0,
-    )
-
-
-def _pan(name: OpenSide, table: Table) -> Region:
-    """The dustpan just beyond the table's edge on that side, open towards the table."""
-    out = OUTWARD[name]
-    axis = int(np.argmax(np.abs(out)))
-    wide, deep, high = PAN_SIZE
-    size = (deep, wide, high) if axis == 0 else (wide, deep, high)
-    middle = table.X_WT.translation + out * (table.size[axis] / 2 + deep / 2 + 0.0005)
-    middle[1 - axis] = SIDES[name].pan
-    middle[2] = TOP - RIMS_BELOW - high / 2
-    opposite: Mapping[OpenSide, OpenSide] = {"-y": "+y", "+y": "-y", "-x": "+x", "+x": "-x"}
-    return Region(PAN, "dustpan", size, 0.01, SE3(np.eye(3), middle), 0.5, open_side=opposite[name])
-
-
-def cubes(count: int = COUNT, seed: int = SEED) -> Iterator[Layout]:
-    """Layouts of 1 to 12 cubes of 1 to 3 cm, the dustpan on each side in turn."""
-    for index in range(count):
-        rng = np.random.default_rng([seed, 0, index])
-        yield _random(index, rng, int(rng.integers(1, MOST_CUBES + 1)), CUBES)
-
-
-def grains(count: int = GRAIN_COUNT, seed: int = SEED) -> Iterator[Layout]:
-    """Layouts of 60 grains of 6 to 8 mm, the dustpan on each side in turn."""
-    for index in range(count):
-        yield _random(index, np.random.default_rng([seed, 1, index]), GRAINS, GRAIN_SIZES)
-
-
-def _random(index: int, rng: np.random.Generator, count: int, sizes: tuple[float, float]) -> Layout:
-    side = list(SIDES)[index % len(SIDES)]
-    x0, x1, y0, y1 = SIDES[side].crumbs
-    edges = rng.uniform(*sizes, count)
-    placed: list[np.ndarray] = []
-    while len(placed) < count:
-        p = rng.uniform((x0, y0), (x1, y1))
-        reach = (edges[: len(placed)] + edges[len(placed)]) / np.sqrt(2.0) + APART
-        if not placed or np.all(np.linalg.norm(np.array(placed) - p, axis=1) > reach):
-            placed.append(p)
-    yaws = rng.uniform(-np.pi, np.pi, count)
-    poses = tuple((float(p[0]), float(p[1]), float(yaw)) for p, yaw in zip(placed, yaws, strict=True))
-    return Layout(side, tuple(float(edge) for edge in edges), poses)
+def measure(layouts: Sequence[Layout], done: Callable[["WipeResult"], None]) -> list["WipeResult"]:
+    """Run them one after the other; `done` is told of each."""
+    results = []
+    for layout in layouts:
+        results.append(run_layout(layout))
+        done(results[-1])
+    return results
 
 
 @dataclass(frozen=True)
 class WipeResult:
-    """What became of one layout: how many crumbs there were and how many lie in the dustpan. strokes: how many it took.
+    """What became of one layout: how many crumbs there were, which don't lie in the dustpan, how many strokes it took.
 
-    pressed_s: simulated seconds from touchdown's beginning to the end of the strokes, pressed_wall_s the real ones that
-    they took. peak_n: largest measured contact force. reason: why not all are in the dustpan, empty if they are.
+    pressed_s: simulated seconds from touchdown's beginning to the end of the strokes, pressed_cpu_s the CPU seconds
+    that took. peak_n: largest measured contact force. reason: why not all are in the dustpan, empty if they are.
     """
 
     layout: Layout
     crumbs: int
-    inside: int
+    missed: tuple[str, ...]
     strokes: int
     robot_s: float
     wall_s: float
     pressed_s: float
-    pressed_wall_s: float
+    pressed_cpu_s: float
     replans: int
     peak_n: float
     failures: tuple[str, ...]
     reason: str
 
     @property
+    def inside(self) -> int:
+        """How many crumbs lie in the dustpan."""
+        return self.crumbs - len(self.missed)
+
+    @property
+    def are_grains(self) -> bool:
+        return self.crumbs == GRAINS
+
+    @property
     def factor(self) -> float:
-        """Simulated seconds for each real one while wiping; 0 without a stroke."""
-        return self.pressed_s / self.pressed_wall_s if self.pressed_wall_s else 0.0
+        """Simulated seconds by seconds of CPU while wiping; 0 without a stroke."""
+        return self.pressed_s / self.pressed_cpu_s if self.pressed_cpu_s else 0.0
 
 
 @dataclass
@@ -188,7 +80,7 @@ class _Witness:
 
     strokes: int = 0
     pressed_s: float = 0.0
-    pressed_wall_s: float = 0.0
+    pressed_cpu_s: float = 0.0
     failures: list[str] = field(default_factory=list)
     _since: tuple[float, float] | None = None
 
@@ -196,10 +88,10 @@ class _Witness:
         data: Mapping = event.data
         if self._since is not None and event.kind in ("phase", "action_failed", "run_ended") and not _presses(data):
             self.pressed_s += event.t - self._since[0]
-            self.pressed_wall_s += time.perf_counter() - self._since[1]
+            self.pressed_cpu_s += time.process_time() - self._since[1]
             self._since = None
         if event.kind == "phase" and data["phase"] == "descend" and data["action"].startswith("wipe"):
-            self._since = event.t, time.perf_counter()
+            self._since = event.t, time.process_time()
             self.strokes += 1
         if event.kind == "action_failed":
             self.failures.append(f"{data['failure']} of {data['action']}: {data['reason']}")
@@ -221,18 +113,59 @@ def run_layout(layout: Layout, seed: int = 0) -> WipeResult:
     witness = _Witness()
     with RunRecorder(scenario, None, witness) as recorder:
         result = run_scenario(scenario, RunOptions(seed=seed, max_sim_time=MAX_SIM_TIME), recorder)
-    inside = sum(place == PAN for name, place in result.places.items() if name != SPONGE)
+    missed = tuple(name for name, place in result.places.items() if place != PAN and name != SPONGE)
     return WipeResult(
         layout,
         len(layout.edges),
-        inside,
+        missed,
         witness.strokes,
         result.robot_s,
         result.wall_s,
         witness.pressed_s,
-        witness.pressed_wall_s,
+        witness.pressed_cpu_s,
         result.replans,
         result.peak_contact_force_n,
         tuple(witness.failures),
-        "" if inside == len(layout.edges) else result.reason,
+        result.reason if missed else "",
     )
+
+
+def print_results(console: Console, results: Sequence[WipeResult]) -> None:
+    """One row a layout."""
+    table = Table(title="crumbs wiped into the dustpan", title_justify="left")
+    for heading in (
+        "dustpan at",
+        "crumbs",
+        "inside",
+        "strokes",
+        "robot s",
+        "replans",
+        "peak N",
+        "real-time factor",
+        "why",
+    ):
+        table.add_column(heading, justify="left" if heading in ("dustpan at", "why") else "right")
+    for r in results:
+        figures = (r.crumbs, r.inside, r.strokes, f"{r.robot_s:.0f}", r.replans, f"{r.peak_n:.0f}", f"{r.factor:.2f}")
+        table.add_row(r.layout.side, *map(str, figures), r.reason)
+    console.print(table)
+
+
+def acceptance(results: Sequence[WipeResult]) -> list[Check]:
+    """The share of crumbs in the dustpan, and the real-time factor while wiping cubes."""
+    kinds = {"cubes": [r for r in results if not r.are_grains], "grains": [r for r in results if r.are_grains]}
+    wanted = {"cubes": CUBES_WANTED, "grains": GRAINS_WANTED}
+    checks = [
+        at_least(f"{kind} in the dustpan", [_share(kinds[kind])], wanted[kind], "%") for kind in kinds if kinds[kind]
+    ]
+    factors = [_factor(kinds[kind]) for kind in kinds if kind == "cubes" and kinds[kind]]
+    return [*checks, at_least("real-time factor, wiping cubes, on average", factors, REAL_TIME_WANTED, "")]
+
+
+def _share(results: Sequence[WipeResult]) -> float:
+    return 100.0 * sum(r.inside for r in results) / sum(r.crumbs for r in results)
+
+
+def _factor(results: Sequence[WipeResult]) -> float:
+    wall = sum(r.pressed_cpu_s for r in results)
+    return sum(r.pressed_s for r in results) / wall if wall else float("nan")

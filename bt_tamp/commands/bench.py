@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 BENCHES = {
     "force": "slides at 0.1 m/s: laws side by side, then every disturbance alone and all together",
+    "wipe": "random crumbs, the dustpan on each side of the table in turn: how many lie in it in the end",
+    "drag": "random flat boxes: how many are dragged to an edge of their table and picked there",
     "control": "cost of a control tick by part beside the bare physics step, and the real-time factor",
 }
 
@@ -32,7 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def call(arguments: argparse.Namespace) -> int:
     """Measure, print, write."""
     stop_on_signals()
-    {"force": _force, "control": _control}[arguments.bench](arguments.out, arguments.quick)
+    measure = {"force": _force, "wipe": _wipe, "drag": _drag, "control": _control}[arguments.bench]
+    measure(arguments.out, arguments.quick)
     return 0
 
 
@@ -58,6 +61,50 @@ def _force(out: Path | None, quick: bool) -> None:
     if out is not None:
         write_json(out / "force.json", checks, slides=[asdict(force.thinned(r)) for r in results])
         _plot(out, results)
+
+
+def _wipe(out: Path | None, quick: bool) -> None:
+    from bt_tamp.quiet import quiet_imports
+
+    with quiet_imports():
+        from bt_tamp.bench import wipe
+    from dataclasses import asdict
+
+    from rich.console import Console
+
+    from bt_tamp.bench.checks import print_checks, write_json
+
+    planned = wipe.planned(quick)
+    with _progress("layouts", len(planned)) as advance:
+        results = wipe.measure(planned, lambda r: advance(f"dustpan at {r.layout.side}: {r.inside} of {r.crumbs}"))
+    console = Console()
+    wipe.print_results(console, results)
+    checks = wipe.acceptance(results)
+    print_checks(console, checks)
+    if out is not None:
+        write_json(out / "wipe.json", checks, layouts=[asdict(r) for r in results])
+
+
+def _drag(out: Path | None, quick: bool) -> None:
+    from bt_tamp.quiet import quiet_imports
+
+    with quiet_imports():
+        from bt_tamp.bench import drag
+    from dataclasses import asdict
+
+    from rich.console import Console
+
+    from bt_tamp.bench.checks import print_checks, write_json
+
+    planned = drag.planned(quick)
+    with _progress("boxes", len(planned)) as advance:
+        results = drag.measure(planned, lambda r: advance(f"to {r.edge}: {'held' if r.is_held else r.reason}"))
+    console = Console()
+    drag.print_results(console, results)
+    checks = drag.acceptance(results)
+    print_checks(console, checks)
+    if out is not None:
+        write_json(out / "drag.json", checks, boxes=[asdict(r) for r in results])
 
 
 def _plot(out: Path, results: list) -> None:

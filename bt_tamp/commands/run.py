@@ -45,23 +45,25 @@ def call(arguments: argparse.Namespace) -> int:
 
     with RunRecorder(scenario, folder, watcher(sys.stdout)) as recorder:
         result = run_scenario(scenario, options, recorder)
+    video = None
     if arguments.render and not options.window and result.outcome not in ("interrupted", "crashed"):
-        _render(folder.path)
+        video = _render(folder.path)
     with outliving_a_closed_pipe():
         print(_closing(result))
-        print(folder.path)
+        print(folder.path if video is None else video)
     return result.exit_code
 
 
-def _render(folder: Path) -> None:
+def _render(folder: Path) -> Path | None:
     """The video, if it can be made: the run's outcome stands without it."""
     from bt_tamp.commands.render import render
     from bt_tamp.errors import UserError
 
     try:
-        render(folder, None)
+        return render(folder, None)
     except UserError as error:
         print(f"bt-tamp: no video: {error}", file=sys.stderr)
+        return None
 
 
 def _closing(result: "RunResult") -> str:

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bt_tamp.report.result import UnintendedContact
-from scenarios.scenario import Scenario
-from sim.bullet import Contact
+from sim.contact import Contact
 from sim.robot import RobotModel
 from skills.context import SkillContext
 
@@ -19,36 +18,37 @@ GAP = 0.2
 class ContactAudit:
     """Reads the engine's truth; it judges, and nothing that acts reads it."""
 
-    def __init__(self, robot: RobotModel, scenario: Scenario) -> None:
+    def __init__(self, robot: RobotModel) -> None:
         self._links = frozenset(robot.links)
         self._fingers = robot.finger_links
         self.found: list[UnintendedContact] = []
         self._latest: dict[frozenset[str], tuple[int, float]] = {}
 
-    def involves_robot(self, contact: Contact, context: SkillContext) -> bool:
-        """Does the contact touch the arm, the hand or what is held?"""
-        held = context.scene.held
-        own = self._links | ({held.name} if held else frozenset())
-        return (contact.first in own) != (contact.second in own) or bool({contact.first, contact.second} & self._links)
+    def of_robot(self, contacts: Sequence[Contact], context: SkillContext) -> list[Contact]:
+        """Those of the contacts that touch the arm, the hand or what is held."""
+        held = context.scene.held.name if context.scene.held else None
+        links = self._links
+        return [
+            contact
+            for contact in contacts
+            if contact.first in links or contact.second in links or (contact.first == held) != (contact.second == held)
+        ]
 
     def look(self, t: float, contacts: Sequence[Contact], context: SkillContext, action: str) -> None:
         """Take in the contacts at time t (s), summed for each pair of names."""
-        held = context.scene.held
-        allowed = context.allowed | (
-            frozenset(frozenset((finger, held.name)) for finger in self._fingers) if held else frozenset()
-        )
         forces: dict[tuple[str, str], float] = {}
-        for contact in contacts:
-            pair = frozenset((contact.first, contact.second))
-            if not self.involves_robot(contact, context) or pair in allowed:
-                continue
-            if pair <= self._links or ("pedestal" in pair and "link_0" in pair):
-                continue
+        for contact in self.of_robot(contacts, context):
             key = (contact.first, contact.second)
             forces[key] = forces.get(key, 0.0) + contact.normal_force
         for (first, second), force in forces.items():
-            if force > THRESHOLD:
+            if force > THRESHOLD and not self._is_meant(frozenset((first, second)), context):
                 self._keep(t, first, second, force, action, context)
+
+    def _is_meant(self, pair: frozenset[str], context: SkillContext) -> bool:
+        held = context.scene.held
+        if pair in context.allowed or pair <= self._links or pair == {"pedestal", "link_0"}:
+            return True
+        return held is not None and held.name in pair and bool(pair & self._fingers)
 
     def _keep(self, t: float, first: str, second: str, force: float, action: str, context: SkillContext) -> None:
         pair = frozenset((first, second))

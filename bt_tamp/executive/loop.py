@@ -3,12 +3,12 @@
 import resource
 import time
 import traceback
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from py_trees.common import Status
-from py_trees.trees import BehaviourTree
 
 from bt_tamp.errors import one_line_of
 from bt_tamp.executive.audit import ContactAudit
@@ -18,6 +18,7 @@ from bt_tamp.export.snapshot import Results
 from bt_tamp.options import RunOptions
 from bt_tamp.report.recorder import RunRecorder
 from bt_tamp.report.result import Outcome, RunResult
+from bt_tamp.report.sentences import counted
 from bt_tamp.report.signals import Contact, Reference
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
@@ -25,6 +26,9 @@ from sim.plant import Command
 
 SAMPLE_EVERY = 5
 """Control ticks between two samples of the signals and two looks at the true contacts: 100 Hz."""
+
+REST_PATIENCE = 30.0
+"""Simulated seconds that things may go on moving once the goal's literals hold."""
 
 MAX_REPLANS = 25
 MAX_ACTIONS = 200
@@ -39,6 +43,8 @@ class Tally:
     energy_j: float = 0.0
     peak_force_n: float = 0.0
     learned: dict[str, None] = field(default_factory=dict)
+    failed: Counter[str] = field(default_factory=Counter)
+    reasons: dict[str, str] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
 
 
@@ -48,6 +54,10 @@ class Audits:
 
     contacts: ContactAudit
     forces: ForceAudit
+
+    @staticmethod
+    def of(machine: Machine) -> "Audits":
+        return Audits(ContactAudit(machine.robot), ForceAudit(machine.robot))
 
 
 @dataclass(frozen=True)
@@ -69,13 +79,16 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
     def report(kind: str, **data: Any) -> None:
         if kind == "learned":
             tally.learned[data["sentence"]] = None
+        if kind == "action_failed":
+            tally.failed[data["action"]] += 1
+            tally.reasons[data["action"]] = data["reason"]
         _report(recorder, tally.t, kind, data, machine.planner.thinking.rounds)
 
     def tree_changed(why: str) -> None:
         recorder.tree(machine.mission.root, why)
 
     machine = build(scenario, options, report, tree_changed)
-    audits = Audits(ContactAudit(machine.robot, scenario), ForceAudit(machine.robot))
+    audits = Audits.of(machine)
     report("run_started", scene=scenario.name, seed=scenario.seed)
     try:
         ending = _run(machine, options, recorder, audits, tally)
@@ -99,36 +112,51 @@ def _run(
     audits: Audits,
     tally: Tally,
 ) -> Ending:
-    plant, context = machine.plant, machine.context
-    tree = BehaviourTree(machine.mission.root)
-    tree.add_visitor(tally.results)
-    tick = 0
+    n = 0
     while True:
-        observation = plant.observe()
-        tally.t = observation.t
-        context.observation = observation
-        if tick % TREE_EVERY == 0:
-            context.scene = machine.belief.update(observation, context.grip.is_closing)
-            tree.tick()
-            ending = _ending(machine, options)
+        look(machine, tally, n)
+        if n % TREE_EVERY == 0:
+            ending = _ending(machine, options, tally)
             if ending:
                 return ending
-        tau = context.controller.update(observation)
-        plant.apply(Command(tau, context.grip.command(observation)))
-        _account(machine, recorder, audits, tally, tick)
-        for _ in range(CONTROL_EVERY):
-            plant.step()
-        tick += 1
+        act(machine, recorder, audits, tally, n)
+        n += 1
 
 
-def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally, tick: int) -> None:
+def look(machine: Machine, tally: Tally, n: int) -> None:
+    """First half of control tick n: observe, and tick the tree when it is due."""
+    context = machine.context
+    context.observation = machine.plant.observe()
+    tally.t = context.observation.t
+    machine.plant.lap("observe")
+    if n % TREE_EVERY == 0:
+        context.scene = machine.belief.update(context.observation, context.grip.is_closing)
+        # BehaviourTree.tick would walk through the whole tree once more, for visitors of a kind that is not here.
+        for node in machine.mission.root.tick():
+            node.visit(tally.results)
+        machine.plant.lap("tree")
+
+
+def act(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally, n: int) -> None:
+    """Second half of control tick n: control, record, and let the world go on."""
+    plant, context = machine.plant, machine.context
+    tau = context.controller.update(context.observation)
+    plant.apply(Command(tau, context.grip.command(context.observation)))
+    plant.lap("apply")
+    _account(machine, recorder, audits, tally, n)
+    plant.lap("record")
+    for _ in range(CONTROL_EVERY):
+        plant.step()
+
+
+def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally, n: int) -> None:
     context = machine.context
     controller, observation = context.controller, context.observation
     force = controller.contact_force if controller.contact else 0.0
     tally.peak_force_n = max(tally.peak_force_n, force)
-    power = np.abs(observation.tau * observation.v).sum()
-    tally.energy_j += float(power) * CONTROL_EVERY * machine.plant.timestep
-    if tick % SAMPLE_EVERY == 0:
+    power = float(np.abs(observation.tau) @ np.abs(observation.v))
+    tally.energy_j += power * CONTROL_EVERY * machine.plant.timestep
+    if n % SAMPLE_EVERY == 0:
         reference = controller.reference
         wanted = reference.force if reference else 0.0
         q_ref = reference.trajectory.at(controller.time_in_reference)[0] if reference else observation.q
@@ -141,28 +169,35 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
         if recorder.contacts_due(observation.t):
             recorder.contacts(
                 observation.t,
-                [
-                    Contact(c.first, c.second, c.position, c.force)
-                    for c in contacts
-                    if audits.contacts.involves_robot(c, context)
-                ],
+                [Contact(c.first, c.second, c.position, c.force) for c in audits.contacts.of_robot(contacts, context)],
             )
 
 
-def _ending(machine: Machine, options: RunOptions) -> Ending | None:
+def _ending(machine: Machine, options: RunOptions, tally: Tally) -> Ending | None:
     verdict = machine.planner.thinking.verdict
     if machine.mission.goal.status == Status.SUCCESS:
         machine.context.report("goal_reached")
         return Ending("goal_reached", "every literal of the goal holds")
     if verdict is not None:
         return Ending("proven_infeasible" if verdict.verdict == "proven" else "no_plan", verdict.reason)
+    restless = machine.mission.goal.restless
+    if restless is not None and machine.context.observation.t - restless[0] > REST_PATIENCE:
+        return Ending("gave_up", f"{', '.join(restless[1])} did not come to rest within {REST_PATIENCE:g} s")
     if machine.planner.thinking.plans > MAX_REPLANS:
-        return Ending("gave_up", f"{MAX_REPLANS} plans were made and none led to the goal")
+        return Ending("gave_up", f"{MAX_REPLANS} plans were made and none led to the goal{_most_often(tally)}")
     if len(machine.agenda.executed) > MAX_ACTIONS:
         return Ending("gave_up", f"{MAX_ACTIONS} actions were carried out and the goal still does not hold")
     if machine.context.observation.t > options.max_sim_time:
         return Ending("gave_up", f"{options.max_sim_time:g} s of simulated time have passed")
     return None
+
+
+def _most_often(tally: Tally) -> str:
+    """Which action failed most often in execution, and why it did last."""
+    if not tally.failed:
+        return ""
+    (action, times), *_ = tally.failed.most_common(1)
+    return f"; {action} failed {counted(times, 'time')}, at last because {tally.reasons[action]}"
 
 
 def _result(machine: Machine, scenario: Scenario, ending: Ending, audits: Audits, tally: Tally) -> RunResult:

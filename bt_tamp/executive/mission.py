@@ -26,13 +26,16 @@ from skills.motions import sequence
 GOAL_TIME = 0.5
 """Seconds for which the goal must hold, everything at rest."""
 
+TOLD_AFTER = 1.0
+"""Seconds of waiting for rest after which it is told what is waited for."""
+
 
 @dataclass(frozen=True)
 class Mission:
     """The tree's root, and the nodes that others look at."""
 
     root: Behaviour
-    goal: Behaviour
+    goal: "GoalReached"
     act: Sequence
 
 
@@ -46,27 +49,41 @@ def mission(agenda: Agenda, context: SkillContext, plan: Behaviour) -> Mission:
 
 
 class GoalReached(Behaviour):
-    """Do all goal literals hold, everything at rest, for half a second, the running action at its end?"""
+    """Do all goal literals hold, everything at rest, for half a second, the running action at its end?
+
+    `restless`: since when (s) the literals hold and something moves, and what; None otherwise.
+    """
 
     def __init__(self, agenda: Agenda, context: SkillContext) -> None:
         super().__init__("goal reached?")
         self._agenda, self._context = agenda, context
         self._since: float | None = None
+        self._told = False
+        self.restless: tuple[float, tuple[str, ...]] | None = None
 
     def update(self) -> Status:
         context = self._context
-        observation = context.observation
+        now = context.observation.t
         missing = self._agenda.goal - self._agenda.facts(context.scene)
-        if missing or moving(observation) or not self._agenda.is_between_actions:
+        if missing or not self._agenda.is_between_actions:
+            self._since = self.restless = None
+            self._told = False
+            self.feedback_message = _still_missing(missing) if missing else ""
+            return Status.FAILURE
+        restless = tuple(moving(context.observation))
+        if restless:
             self._since = None
-            self.feedback_message = _still_missing(missing)
+            self.restless = (self.restless[0] if self.restless else now, restless)
+            if not self._told and now - self.restless[0] > TOLD_AFTER:
+                self._told = True
+                context.report("waiting", bodies=list(restless))
+            self.feedback_message = f"waiting for {', '.join(restless)} to come to rest"
             return Status.FAILURE
-        if self._since is None:
-            self._since = observation.t
-        if observation.t - self._since < GOAL_TIME:
-            return Status.FAILURE
+        self.restless = None
         self.feedback_message = ""
-        return Status.SUCCESS
+        if self._since is None:
+            self._since = now
+        return Status.SUCCESS if now - self._since >= GOAL_TIME else Status.FAILURE
 
 
 class PlanStillGood(Behaviour):
@@ -88,4 +105,4 @@ def planning(lift_off: Behaviour, plan: Behaviour) -> Behaviour:
 
 
 def _still_missing(missing: frozenset[Fact]) -> str:
-    return "missing: " + ", ".join(str(fact) for fact in sorted(missing)) if missing else "waiting for rest"
+    return "missing: " + ", ".join(str(fact) for fact in sorted(missing))

@@ -1,5 +1,7 @@
 """What moves: planning and judging a run wait until things have come to rest."""
 
+import math
+
 import numpy as np
 
 from sim.plant import Observation
@@ -15,4 +17,4 @@ def moving(observation: Observation) -> list[str]:
 
 
 def _moves(V_WO: np.ndarray) -> bool:
-    return bool(np.linalg.norm(V_WO[:3]) > REST_SPEED or np.linalg.norm(V_WO[3:]) > REST_TURN)
+    return math.hypot(*V_WO[:3]) > REST_SPEED or math.hypot(*V_WO[3:]) > REST_TURN

@@ -8,7 +8,7 @@ def sentence(event: Event) -> str | None:
     data = event.data
     match event.kind:
         case "run_started":
-            return f"{data['scene']}, seed {data['seed']}"
+            return f"{data['scene']}, seed {data['seed']}: planning (a first run compiles too; times are the robot's)"
         case "round":
             return f"round {data['round']}: {_proposal(data['plan'])}"
         case "proof_sought":
@@ -27,8 +27,12 @@ def sentence(event: Event) -> str | None:
             return f"{data['action']} failed: {data['reason']}"
         case "refined_again":
             return f"{data['action']} is worked out anew: {data['reason']}"
+        case "pressed_harder":
+            return f"{data['action']} slips: pressed with {data['force']:.0f} N from now on"
         case "replan":
             return f"planning again: {data['reason']}"
+        case "waiting":
+            return f"waiting for {', '.join(data['bodies'])} to come to rest"
         case "goal_reached":
             return "goal reached"
         case "run_ended" if data["outcome"] != "goal_reached":

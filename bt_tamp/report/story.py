@@ -108,6 +108,11 @@ class _Teller:
         reason = "" if data["reason"] == self._last_failure else f", because {data['reason']}"
         self._say(f"The plan was dropped{reason}, and a new one sought from what was observed then.")
 
+    def _waiting(self, event: Event, data: Any) -> None:
+        self._say(
+            f"Everything lay where it should; {', '.join(data['bodies'])} still moved.", f"{event.t:7.1f} s          "
+        )
+
     def _goal_reached(self, event: Event, data: Any) -> None:
         self._say("The goal held, everything at rest.", f"{event.t:7.1f} s          ")
 
@@ -131,7 +136,7 @@ class _Teller:
         )
         for motion in result.pressed:
             self._say(
-                f"{motion.action} pressed with {motion.mean_n:.2f} N, {motion.target_n:g} N wanted: off by"
+                f"{motion.action} pressed with {motion.mean_n:.2f} N, {motion.target_n:.4g} N wanted: off by"
                 f" {motion.rms_error_n / motion.target_n:.1%} (RMS), peak {motion.peak_n:.1f} N",
                 "  - ",
             )

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from fractions import Fraction
+from itertools import pairwise
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 from PIL import Image
 
+from bt_tamp.quiet import quiet_imports
 from bt_tamp.report.film import Filming, Recording, Shot
 from bt_tamp.report.folder import VIDEO, replacing
 from scenarios.scenario import Scenario
@@ -36,6 +38,9 @@ PACES = (
 
 READING_S, READING_MORE_S = 1.6, 0.9
 """Film seconds for which the film stands still to let a sentence, and each further one, be read."""
+
+MOST_READING_S = 20.0
+"""Film seconds for which it stands still in all: more sentences are shown for a shorter time each."""
 
 END_S = 1.5
 BATCH = 6
@@ -81,14 +86,14 @@ def shots_of(recording: Recording, cost: float) -> list[tuple[Shot, int]]:
     fitting = (pace for pace in PACES if duration * RATE / (pace[0] * pace[1]) * cost <= BUDGET_S)
     speed, hold = next(fitting, PACES[-1])
     step = speed * hold / RATE
-    shots: list[tuple[Shot, int]] = []
-    before = -np.inf
-    for number in range(int(np.ceil(duration / step)) + 1):
-        t = min(number * step, duration)
-        told = recording.timeline.told_between(before, t)
-        pause = round(RATE * (READING_S + READING_MORE_S * (len(told) - 1))) if told else 0
-        shots.append((Shot(t, float(speed), told), hold + pause))
-        before = t
+    times = [min(number * step, duration) for number in range(int(np.ceil(duration / step)) + 1)]
+    told = [recording.timeline.told_between(a, b) for a, b in pairwise([-np.inf, *times])]
+    pauses = [READING_S + READING_MORE_S * (len(words) - 1) if words else 0.0 for words in told]
+    haste = min(1.0, MOST_READING_S / max(sum(pauses), 1e-9))
+    shots = [
+        (Shot(t, float(speed), words), hold + round(RATE * haste * pause))
+        for t, words, pause in zip(times, told, pauses, strict=True)
+    ]
     last, pictures = shots[-1]
     shots[-1] = (last, pictures + round(RATE * END_S))
     return shots
@@ -137,7 +142,8 @@ def _pictures(folder: Path, filming: Filming, shots: list[tuple[Shot, int]], wor
     try:
         waiting: deque[Future[list[np.ndarray]]] = deque()
         for batch in batches:
-            waiting.append(crew.submit(_take_batch, batch))
+            with quiet_imports():  # A worker that starts here inherits what its imports may say.
+                waiting.append(crew.submit(_take_batch, batch))
             if len(waiting) > 2 * workers:
                 yield from waiting.popleft().result()
         while waiting:

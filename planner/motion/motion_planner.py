@@ -9,7 +9,7 @@ from pinocchio import SE3
 from planner.failure import MotionFailure
 from planner.motion.blame import blame
 from planner.motion.checking import CollisionChecker
-from planner.motion.collision import FastChecker, hand_hits
+from planner.motion.collision import FastChecker, hand_hits, part_names
 from planner.motion.exact import Contact, ExactChecker
 from planner.motion.ik import ClosedFormIK
 from planner.motion.ik_numeric import track_numerically
@@ -18,8 +18,8 @@ from planner.motion.ompl_ import PathSettings, Query, plan_path
 from planner.motion.shortcut import shortened
 from planner.motion.timing import time_line, time_path, time_path_with_stops
 from planner.motion.trajectory import Trajectory
-from planner.motion.world import FREE_MARGIN, Margins, movables
-from planner.refinement import Pair, Work
+from planner.motion.world import FREE_MARGIN, Margins, movables, obstacles
+from planner.refinement import Pair, Work, pairs
 from sim.robot import RobotModel
 from sim.scene import SceneState
 
@@ -151,12 +151,16 @@ class MotionPlanner:
         allowed: frozenset[Pair] = NOTHING,
         margin: float | None = None,
         since: float = 0.0,
+        only: frozenset[str] | None = None,
     ) -> MotionFailure | None:
         """None if what is left of the trajectory `since` seconds after its start is free by the exact model.
 
-        What is near then already may stay as near, see `move`.
+        What is near then already may stay as near, see `move`. `only` these bodies are looked at (None: everything).
         """
         start = trajectory.at(since)[0]
+        if only is not None:
+            others = frozenset(obstacle.name for obstacle in obstacles(scene)) - only
+            allowed = allowed | pairs(frozenset(part_names(self.robot, scene.held)), others)
         margins = Margins(self.settings.audit_margin if margin is None else margin, allowed)
         near = self._near(scene, start, margins)
         left = trajectory.q[trajectory.times - trajectory.times[0] > since]

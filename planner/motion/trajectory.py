@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 
 @dataclass(frozen=True)
@@ -62,19 +63,9 @@ class Trajectory:
 
     def at(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Position, velocity and acceleration (7,) at t seconds after the first knot."""
-        s = t + self.times[0]
-        if s <= self.times[0]:
-            return self.q[0], np.zeros(7), np.zeros(7)
-        if s >= self.times[-1]:
-            return self.q[-1], np.zeros(7), np.zeros(7)
-        i = int(np.searchsorted(self.times, s, side="right")) - 1
-        h = self.times[i + 1] - self.times[i]
-        u = (s - self.times[i]) / h
-        powers = np.array(
-            [[1.0, u, u * u, u * u * u], [0.0, 1 / h, 2 * u / h, 3 * u * u / h], [0.0, 0.0, 2 / h**2, 6 * u / h**2]]
-        )
-        q, v, a = powers @ self._coefficients[i]
-        return q, v, a
+        now = np.zeros((3, 7))
+        _evaluate(self.times, self._coefficients, self.q, t, now)
+        return now[0], now[1], now[2]
 
     @cached_property
     def _coefficients(self) -> np.ndarray:
@@ -88,3 +79,20 @@ class Trajectory:
         """Configurations (k,7) every `step` seconds, both ends included."""
         count = max(2, int(np.ceil(self.duration / step)) + 1)
         return np.array([self.at(t)[0] for t in np.linspace(0.0, self.duration, count)])
+
+
+@njit(cache=True)
+def _evaluate(times: np.ndarray, coefficients: np.ndarray, q: np.ndarray, t: float, now: np.ndarray) -> None:
+    """Fill in `now` (3,7): position, velocity and acceleration t seconds after the first knot."""
+    s = t + times[0]
+    if s <= times[0] or s >= times[-1]:
+        now[0] = q[0] if s <= times[0] else q[-1]
+        return
+    i = np.searchsorted(times, s, side="right") - 1
+    h = times[i + 1] - times[i]
+    u = (s - times[i]) / h
+    for j in range(now.shape[1]):
+        c0, c1, c2, c3 = coefficients[i, 0, j], coefficients[i, 1, j], coefficients[i, 2, j], coefficients[i, 3, j]
+        now[0, j] = c0 + u * (c1 + u * (c2 + u * c3))
+        now[1, j] = (c1 + u * (2.0 * c2 + u * 3.0 * c3)) / h
+        now[2, j] = (2.0 * c2 + 6.0 * u * c3) / h**2

@@ -72,10 +72,10 @@ class Layout:
 
 def layout(scenario: Scenario) -> Layout:
     """The scenario's layout; the same object for the same scenario."""
-    return _layout(_Identity(scenario))
+    return _layout(Identity(scenario))
 
 
-class _Identity:
+class Identity:
     """Makes an object a key by what it is, not what it holds."""
 
     def __init__(self, it: Any) -> None:
@@ -85,11 +85,11 @@ class _Identity:
         return id(self.it)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Identity) and self.it is other.it
+        return isinstance(other, Identity) and self.it is other.it
 
 
 @lru_cache(maxsize=8)
-def _layout(scenario: _Identity) -> Layout:
+def _layout(scenario: Identity) -> Layout:
     return Layout(scenario.it)
 
 

@@ -322,5 +322,6 @@ class Learned:
             return f"{action} needs {' or '.join(texts)} out of the way{where}"
         if self._is_grasp_fact(action, own):
             first = " or ".join(achievers_of_grasps(self._domain))
-            return f"{own.body} cannot be grasped as it lies" + (f": {first} it first" if first else "")
+            change = f"; {first} may change that" if first else ""
+            return f"{own.body} cannot be grasped as it lies ({case.reason}){change}"
         return f"{action} doesn't work {place}: {case.reason}"

@@ -13,13 +13,22 @@ from sim.robot import RobotModel
 from sim.wrench import Wrench
 from skills.control.bridge import Bridge
 from skills.control.contact import ContactWrench, Touch
-from skills.control.force import ForceLoop
+from skills.control.force import ForceLoop, smooth_step
 from skills.control.limits import ApproachLimit, Row
 from skills.control.momentum import MomentumObserver
 from skills.control.reference import Course, Reference, near_contact
 from skills.control.safety import Collision, ForceTooHigh, Guard, SafetyLimits, Stop
 from skills.control.state import ArmState, Target, measure, target_at
-from skills.control.tasks import HybridTask, JointTask, PoseTask, PostureTask, Task, pose_error
+from skills.control.tasks import (
+    LANDING_DAMPING,
+    SINK_DAMPING,
+    HybridTask,
+    JointTask,
+    PoseTask,
+    PostureTask,
+    Task,
+    pose_error,
+)
 from skills.control.torque_qp import TorqueQP, nobody
 
 LOST_AFTER = 0.014
@@ -31,6 +40,9 @@ LOST_AFTER_TOUCH = 0.25
 GUARDED, GUARDED_DAMPING = 400.0, 25.0
 """Gains in 1/s² and 1/s on the way to contact: low, for what a hard surface does to the velocity comes back as
 torque at once, and until the touch is noticed the arm goes on pressing with the stiffness."""
+
+LANDING = 0.12
+"""Seconds after touching in which bouncing is damped."""
 
 PRESSED_SETTLING = 0.1
 """Seconds that the force is left to settle after it was ramped up."""
@@ -73,8 +85,9 @@ class ArmController:
 
     What it follows is set by `follow` and `hold`, which take effect at the next `update`. It holds
     at first. Losing contact while pressed, it holds and says so in `contact_lost`. When a safety limit is about
-    to be passed or something unexpected pushes, it comes to rest, holds and says why in `stopped`, until it is
-    told what to follow next. `lap` is called with the name of each part of an update that has just been done.
+    to be passed or something unexpected pushes, it comes to rest, holds and says why in `stopped`, until that is
+    acknowledged or it is told what to follow next. `lap` is called with the name of each part of an update that has
+    just been done.
     """
 
     def __init__(
@@ -124,6 +137,13 @@ class ArmController:
         if self._pending is None and self._reference is None:
             return
         self._pending, self._hold_pending = None, True
+
+    def acknowledge(self) -> None:
+        """Take note of a stop: hold stiffly again, from where the arm is now."""
+        if self.stopped is not None:
+            self.stopped = self._unexplained = None
+            self._guard.reset()
+            self._hold_pending = True
 
     def set_payload(self, mass: float, com_G: np.ndarray, inertia_G: np.ndarray) -> None:
         """A rigid load is in the hand: mass in kg, centre com_G (3,) in m, inertia (3,3) in kg m² about it, in G."""
@@ -343,11 +363,13 @@ class ArmController:
             wrench = felt.smooth.copy()
             force = self._loop.update(float(normal @ felt.raw[:3]))
             wrench[:3] += normal * (force - normal @ wrench[:3])
-            return [HybridTask(target, reference.R_WC), posture], wrench, limits
+            landed = smooth_step(self._loop.time / LANDING) if reference.until_contact else 1.0
+            damping = LANDING_DAMPING + (SINK_DAMPING - LANDING_DAMPING) * landed
+            return [HybridTask(target, reference.R_WC, reference.damping * damping), posture], wrench, limits
         assert reference.stiffness is not None
         if self._pressed:
             target = self._pressed_target(target, reference)
-        return [PoseTask(target, reference.stiffness, self._period), posture], _NO_WRENCH, limits
+        return [PoseTask(target, reference.stiffness, self._period, reference.damping), posture], _NO_WRENCH, limits
 
     def _pressed_target(self, target: Target, reference: Reference) -> Target:
         """The target in the plane through the touched point, below it by force over stiffness."""

@@ -41,6 +41,11 @@ class ForceLoop:
         self._ramp = min(max(SHORTEST_RAMP, abs(force - self._from) / RAMP_RATE), LONGEST_RAMP)
 
     @property
+    def time(self) -> float:
+        """Seconds since the ramp to the present target began."""
+        return self._time
+
+    @property
     def time_since_ramp(self) -> float:
         """Seconds since the wanted force arrived at its target; negative before."""
         return self._time - self._ramp

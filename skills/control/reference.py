@@ -24,6 +24,8 @@ class Reference:
     it). "hybrid": stiffly in all directions of the contact frame C but its z, along which the
     measured force is regulated.
 
+    damping: impedance as a ratio of critical damping; in hybrid mode what damps the sinking onto the surface, as a
+    ratio of the usual.
     force: N to press with along −z of C (0: none). Impedance shifts its set-point below the touched
     surface by force over stiffness, without measuring what comes of it.
     R_WC (3,3): axes of C in W; z is the surface's outward normal.
@@ -40,12 +42,15 @@ class Reference:
     force: float = 0.0
     R_WC: np.ndarray = field(default_factory=lambda: np.eye(3))
     until_contact: bool = False
+    damping: float = 1.0
 
     def __post_init__(self) -> None:
         if self.mode not in ("position", "impedance", "hybrid"):
             raise ValueError(f"control mode {self.mode!r}, expected position, impedance or hybrid")
         if not self.force >= 0.0:
             raise ValueError(f"force to press with is {self.force} N, expected 0 or more")
+        if not self.damping > 0.0:
+            raise ValueError(f"damping ratio is {self.damping}, expected above 0")
         if self.mode == "position" and self.force > 0.0:
             raise ValueError(f"position mode can't press with {self.force} N, expected impedance or hybrid")
         if self.mode == "hybrid" and self.force == 0.0:

@@ -26,6 +26,9 @@ DAMPED = 80.0
 SINK_DAMPING = 20.0
 """Velocity gain in 1/s along a force-controlled direction."""
 
+LANDING_DAMPING = 50.0
+"""The same at touchdown, against bouncing: later it would hold back the force."""
+
 
 @dataclass(frozen=True, slots=True)
 class Rows:
@@ -79,14 +82,16 @@ class PostureTask:
 
 
 class PoseTask:
-    """Impedance of the tool towards a target: Λ (ẍ − ẍ_d) + D ė + K e = F_ext, each mode critically damped.
+    """Impedance of the tool towards a target: Λ (ẍ − ẍ_d) + D ė + K e = F_ext, each mode critically damped,
+    or with `ratio` times as much.
 
     stiffness (6,): N/m and Nm/rad along and about W's axes, all positive. External force is not
     compensated, so a static force F displaces the tool by F/K. period: of the control ticks, in s.
     """
 
-    def __init__(self, target: Target, stiffness: np.ndarray, period: float) -> None:
+    def __init__(self, target: Target, stiffness: np.ndarray, period: float, ratio: float = 1.0) -> None:
         self._target = target
+        self._ratio = ratio
         self._root = np.sqrt(stiffness)
         self._period = period
 
@@ -101,7 +106,7 @@ class PoseTask:
         frequencies = np.sqrt(np.maximum(squares, 0.0))
         spring = modes.T @ (root * pose_error(target, state))
         damper = modes.T @ (root * (target.V - state.V))
-        damping = frequencies * np.maximum(2.0 - frequencies * self._period / 2, 1.0)
+        damping = self._ratio * frequencies * np.maximum(2.0 - frequencies * self._period / 2, 1.0)
         pull = modes @ (squares * spring + damping * damper)
         return Rows(state.J, target.A + pull / root - state.drift)
 
@@ -111,16 +116,17 @@ class HybridTask:
     """Follow the target stiffly, except along the z axis of the contact frame C: there velocity is
     only damped, and a force (added by the caller as a feedforward torque) decides.
 
-    R_WC (3,3): axes of C in W.
+    R_WC (3,3): axes of C in W. sink_damping: 1/s along z of C.
     """
 
     target: Target
     R_WC: np.ndarray
+    sink_damping: float = SINK_DAMPING
 
     def rows(self, state: ArmState) -> Rows:
         target, wanted = self.target, np.empty(6)
         _fill_pose_error(target.p, target.R, state.p, state.R, wanted)
-        _hybrid_acceleration(wanted, target.V, target.A, state.V, state.drift, self.R_WC)
+        _hybrid_acceleration(wanted, target.V, target.A, state.V, state.drift, self.R_WC, self.sink_damping)
         return Rows(state.J, wanted)
 
 
@@ -181,7 +187,13 @@ def _fill_pose_error(p_d: np.ndarray, R_d: np.ndarray, p: np.ndarray, R: np.ndar
 
 @njit(cache=True)
 def _hybrid_acceleration(
-    wanted: np.ndarray, V_d: np.ndarray, A_d: np.ndarray, V: np.ndarray, drift: np.ndarray, R_WC: np.ndarray
+    wanted: np.ndarray,
+    V_d: np.ndarray,
+    A_d: np.ndarray,
+    V: np.ndarray,
+    drift: np.ndarray,
+    R_WC: np.ndarray,
+    sink_damping: float,
 ) -> None:
     """From the pose error (6,) in `wanted` to the rows' b."""
     along = sinking = 0.0
@@ -191,7 +203,7 @@ def _hybrid_acceleration(
         along += wanted[i] * R_WC[i, 2]
         sinking += V[i] * R_WC[i, 2]
     for i in range(3):
-        wanted[i] -= R_WC[i, 2] * (SINK_DAMPING * sinking + along)
+        wanted[i] -= R_WC[i, 2] * (sink_damping * sinking + along)
     for i in range(6):
         wanted[i] -= drift[i]
 

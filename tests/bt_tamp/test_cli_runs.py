@@ -205,3 +205,33 @@ def test_an_error_in_our_own_code_ends_a_run_with_a_whole_folder(
     assert "broken on purpose" in capsys.readouterr().out
     assert "RuntimeError" in (tmp_path / "run" / "crash.txt").read_text()
     assert json.loads((tmp_path / "run" / "result.json").read_text())["outcome"] == "crashed"
+
+
+@pytest.mark.parametrize(
+    ("objects", "goal", "reason"),
+    [
+        (
+            "  brick: {shape: {box: [0.09, 0.09, 0.12]}, mass: 0.3, pose: {on: table, xy: [0.6, 0.1]}}",
+            "(in_bin brick cup)",
+            "brick is 9.0 cm thick, which is more than the 6.0 cm inside cup",
+        ),
+        (
+            "  can: {shape: {box: [0.06, 0.06, 0.1]}, mass: 0.3, pose: {on: table, xy: [2.2, 0.1]}}",
+            "(in_bin can crate)",
+            "from the shoulder, the arm reaches",
+        ),
+        (
+            "  pea: {shape: {box: [0.02, 0.02, 0.02]}, mass: 0.01, pose: {on: table, xy: [0.6, 0.1]}}",
+            "(in_bin pea tray)",
+            "wipe needs is_sponge(?with), which holds of nothing here",
+        ),
+    ],
+)
+def test_what_geometry_rules_out_is_proven_and_said(
+    objects: str, goal: str, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cup = "  cup: {kind: bin, size: [0.08, 0.08, 0.08], pose: {xyz: [0.0, -0.75, -0.1]}}\n"
+    (tmp_path / "scene.yaml").write_text(f"{TABLE.replace('objects:', cup + 'objects:')}{objects}\ngoal: {goal!r}\n")
+
+    assert main(["plan", str(tmp_path / "scene.yaml")]) == 10
+    assert reason in " ".join(capsys.readouterr().out.split())

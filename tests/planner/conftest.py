@@ -92,7 +92,7 @@ class StandIn:
                 return replace(self._put(scene, name, rest[0], sample), held=None)
             case "wipe":
                 return self._put(scene, name, rest[1], sample)
-            case "drag":
+            case "drag" | "drag_aside":
                 X_WO = scene.poses[name]
                 return scene.moved(name, at(0, -0.1 - 0.02 * sample) * X_WO)
         raise AssertionError(refinement.action)

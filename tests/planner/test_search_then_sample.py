@@ -20,7 +20,7 @@ from scenarios.load import load_scenario
 from sim.scene import SceneState
 
 DOMAIN = read_domain(read_text(Path(skills.__file__).parent / "domain.pddl"))
-PRIMITIVES = ("pick", "place", "wipe", "drag")
+PRIMITIVES = ("pick", "place", "wipe", "drag", "drag_aside")
 
 
 class Run:
@@ -51,6 +51,11 @@ class Run:
     @property
     def learned(self):
         return [event["sentence"] for event in self.of("learned")]
+
+
+def never(sample, scene):
+    """No sample works, and nothing movable is to blame."""
+    return set()
 
 
 def labels(solution):
@@ -118,7 +123,7 @@ def test_fig1_ends_in_a_nine_action_plan(paper, stand_in, until):
             "place(sponge, left_bin)",
         ]
     )
-    assert "book cannot be grasped as it lies: drag it first" in run.learned
+    assert "book cannot be grasped as it lies (every sample is blocked); drag may change that" in run.learned
     assert reached(solution, scene.scenario.goal)
 
 
@@ -339,9 +344,6 @@ def test_a_body_back_where_it_was_in_the_way_is_not_away(tabletop, stand_in, is_
 
 
 def test_without_any_way_the_budget_is_widened_and_then_the_search_ends(tabletop, stand_in):
-    def never(sample, scene):
-        return set()
-
     run = Run(stand_in(rule(pick_cup=never, drag_cup=never)), widenings=2)
     outcome = run.plan(tabletop("cup mug"), CUP_AWAY)
     assert isinstance(outcome, NoPlan)
@@ -356,8 +358,10 @@ def test_obstacles_in_each_others_way_end_in_no_plan_that_names_them(tabletop, s
             rule(
                 pick_cup=lambda sample, scene: {"mug"} if is_at_start(scene, "mug") else None,
                 pick_mug=lambda sample, scene: {"cup"} if is_at_start(scene, "cup") else None,
-                drag_cup=lambda sample, scene: set(),
-                drag_mug=lambda sample, scene: set(),
+                drag_cup=never,
+                drag_mug=never,
+                drag_aside_cup=never,
+                drag_aside_mug=never,
             )
         )
     )
@@ -366,6 +370,31 @@ def test_obstacles_in_each_others_way_end_in_no_plan_that_names_them(tabletop, s
     assert outcome.verdict == "budget"
     assert outcome.culprits >= {"cup", "mug"}
     assert "mug obstructs pick(cup, table)" in outcome.reason
+
+
+def test_what_stands_in_the_way_and_can_neither_be_grasped_nor_dragged_to_a_grasp_is_dragged_aside(
+    tabletop, stand_in, is_at_start
+):
+    run = Run(
+        stand_in(
+            rule(
+                wipe_carrot=lambda sample, scene: {"mug"} if is_at_start(scene, "mug") else None,
+                pick_mug=never,
+                drag_mug=never,
+            )
+        )
+    )
+    solution = run.plan(tabletop("mug", "carrot"), "(in_bin carrot dustpan)")
+    assert labels(solution) == ["drag_aside(mug, table)", "pick(sponge, dustpan)", WIPE_CARROT]
+    assert "mug obstructs wipe(carrot, table, dustpan)" in run.learned
+
+
+def test_what_was_dragged_aside_is_no_easier_to_grasp_there(tabletop, stand_in):
+    run = Run(stand_in(rule(pick_cup=never, drag_cup=never)))
+    outcome = run.plan(tabletop("cup"), CUP_AWAY)
+    assert isinstance(outcome, NoPlan)
+    plans = [plan for plan in run.rounds if plan and "drag_aside(cup, table)" in plan]
+    assert all(plan.index("drag(cup, table)") > plan.index("drag_aside(cup, table)") for plan in plans)
 
 
 def test_obstacles_in_each_others_way_are_dragged_apart(tabletop, stand_in, is_at_start):
@@ -479,7 +508,7 @@ def test_a_sample_that_failed_in_execution_is_avoided_and_after_three_the_action
     assert labels(run.plan(scene, CUP_AWAY))[0] == "drag(cup, table)"
     samples = [call[1] for call in skill.calls if call[0] == "pick(cup, table)"]
     assert samples[:3] == [[0], [1], [2]]
-    assert run.learned == ["cup cannot be grasped as it lies: drag it first"]
+    assert run.learned == ["cup cannot be grasped as it lies (nothing between the fingers); drag may change that"]
 
 
 def test_a_failure_met_when_an_action_starts_is_learned_from(tabletop, stand_in, is_at_start):

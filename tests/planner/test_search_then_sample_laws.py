@@ -19,7 +19,7 @@ from planner.task.pyperplan_ import PyperplanPlanner
 ROOT = Path(skills.__file__).parents[1]
 DOMAIN = read_domain(read_text(ROOT / "skills" / "domain.pddl"))
 NAMES = ("jug", "mug", "pot", "cup")
-PRIMITIVES = ("pick", "place", "wipe", "drag")
+PRIMITIVES = ("pick", "place", "wipe", "drag", "drag_aside")
 
 
 class Course:
@@ -29,7 +29,7 @@ class Course:
         self.needs, self.reveals, self.is_at_start = needs, reveals, is_at_start
 
     def __call__(self, action, sample, scene):
-        if action.name == "drag":
+        if action.name in ("drag", "drag_aside"):
             return set()
         if action.name != "pick" or action.args[0] not in self.needs or sample >= 3:
             return set() if action.name == "pick" and sample >= 3 else None

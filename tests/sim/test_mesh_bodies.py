@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
+import pybullet as p
 import pytest
 from pinocchio import SE3
 
@@ -95,3 +96,14 @@ def test_it_is_seen_where_it_is(with_body):
     assert red.sum() > 100
     assert abs(columns.mean() - x) < 15
     assert abs(rows.mean() - y) < 15
+
+
+@pytest.mark.parametrize("shape", [_hull(), _tee()])
+def test_the_engine_has_its_mass_and_its_moments_about_its_centre(robot, with_body, shape):
+    plant = BulletPlant(with_body(shape), robot)
+    try:
+        info = p.getDynamicsInfo(plant._bodies["it"], -1, physicsClientId=plant._client)
+    finally:
+        plant.close()
+    assert info[0] == pytest.approx(0.2)
+    np.testing.assert_allclose(info[2], np.linalg.eigvalsh(inertia(shape, 0.2)), rtol=1e-6)

@@ -69,6 +69,7 @@ class Bench:
             refine=lambda what: (self.refine(what), 0.0),
             contact_mode=contact,
         )
+        self.latest: ActionRun | None = None
         self.peak_force = 0.0
         self.forces: dict[str, list[float]] = {}
 
@@ -79,8 +80,11 @@ class Bench:
     def belief_mass(self, name: str, mass: float) -> None:
         """Have everything above the plant believe that a body has another mass than it truly has."""
         bodies = self.plant.scenario.bodies
-        believed = replace(self.plant.scenario, bodies={**bodies, name: replace(bodies[name], mass=mass)})
-        self._belief = Belief(believed, self.robot)
+        self.believe(replace(self.plant.scenario, bodies={**bodies, name: replace(bodies[name], mass=mass)}))
+
+    def believe(self, scenario: Scenario) -> None:
+        """Have everything above the plant believe in another scene than there truly is."""
+        self._belief = Belief(scenario, self.robot)
         self.context.scene = self._belief.update(self.context.observation, False)
 
     def refine(self, what: GroundAction) -> Refinement | RefinementFailure:
@@ -89,7 +93,8 @@ class Bench:
     def do(self, text: str) -> Status:
         """Carry out an action to its end; SUCCESS or FAILURE (then context.failure says why)."""
         what = action(text)
-        tree = BehaviourTree(self.skills[what.name].subtree(ActionRun(what), self.context))
+        self.latest = ActionRun(what)
+        tree = BehaviourTree(self.skills[what.name].subtree(self.latest, self.context))
         start = self.context.observation.t
         while self.context.observation.t - start < LIMIT:
             tree.tick()

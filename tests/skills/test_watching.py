@@ -98,3 +98,11 @@ def test_what_is_put_in_the_way_of_a_stroke_ends_it_before_it_is_hit():
     assert isinstance(bench.context.failure, SceneChanged)
     assert "box" in bench.context.failure.reason
     assert np.linalg.norm(bench.scene.poses["box"].translation - box.translation) < 0.002
+
+
+def test_what_stirs_beside_the_stroke_does_not_end_it():
+    scene = with_pose(scene_with("box", "carrot", "sponge"), "box", 0.5, 0.3)
+    bench = Bench(scene)
+    assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
+    nudge = shifted(bench, "box", 0.004, 0.0)
+    assert carried_out(bench, "wipe(carrot, table, dustpan)", "descend", 0.1, nudge) is Status.SUCCESS

@@ -75,7 +75,7 @@ def test_no_culprits_at_all_mean_that_there_is_no_grasp(learned, scene):
     learned.learn(failed(PICK, set(), set()), Situation.now(scene), (), 20)
     assert learned.constraints() == {}
     assert learned.ungraspable(scene) == learned.stuck(scene) == {"cup"}
-    assert learned.sentences() == ["cup cannot be grasped as it lies: drag it first"]
+    assert learned.sentences() == ["cup cannot be grasped as it lies (all samples are blocked); drag may change that"]
 
 
 def test_an_action_that_needs_no_grasp_and_has_no_culprits_needs_its_object_elsewhere(learned, scene):

@@ -79,6 +79,18 @@ def test_every_mode_of_the_sampled_impedance_is_critically_damped(lab, bend):
     assert np.all((poles.real > 0.0) & (poles.real < 1.0))
 
 
+def test_a_damping_ratio_scales_what_answers_velocity_and_nothing_else(lab):
+    state = state_at(lab.robot, lab.home)
+    target = Target(state.p + 0.01, state.R, np.zeros(6), np.zeros(6))
+
+    def answer(ratio, V):
+        return PoseTask(target, lab.stiffness, 0.002, ratio).rows(replace(state, V=np.full(6, V))).b
+
+    still = answer(1.0, 0.0)
+    np.testing.assert_allclose(answer(2.0, 0.0), still)
+    np.testing.assert_allclose(answer(2.0, 0.1) - still, 2.0 * (answer(1.0, 0.1) - still), rtol=1e-9)
+
+
 def test_the_target_moves_as_the_joints_make_it_move(robot):
     rng = np.random.default_rng(2)
     q, v, a = rng.uniform(-1.0, 1.0, (3, 7))

@@ -1,0 +1,243 @@
+"""Towing: closed fingertips press on an object from above and take it along by friction.
+
+The object is meant to keep its orientation. Fingertips that turn can't turn it: their patch is small beside the
+face it lies on, and of two fingertips apart one always bears less and slips.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+from pinocchio import SE3
+
+from planner.failure import Blocked, MotionFailure, RefinementFailure
+from planner.refinement import Phase, pairs
+from planner.stability import room_about, tops
+from planner.task.symbols import GroundAction
+from scenarios.scenario import Body, Table
+from scenarios.shapes import Compound, Cylinder, Hull, Sphere, extents, middle
+from sim.robot import GRAVITY, Gripper
+from sim.scene import Held, SceneState, height_above
+from skills.pressing import Pressing
+from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way
+from skills.waypoints import raised, shifted
+
+HEIGHT = 0.08
+CLOSE = 0.015
+"""Metres above the object from which contact is sought slowly."""
+
+PROBE = 0.012
+TOUCH_SPEED = 0.015
+"""m/s: on something rigid, touchdown at 0.03 m/s peaks above 50 N."""
+
+NEAR_SPEED = 0.15
+SPEED = 0.08
+
+FORCE_FACTOR = 2.0
+"""How many times as hard as friction asks for is pressed at first."""
+
+LEAST_FORCE = 8.0
+GREATEST_FORCE = 45.0
+"""Newtons: what is above it at touchdown passes the limit on contact forces."""
+
+HARDER = 2.0
+RESERVE = 0.03
+"""Metres by which the hand can go farther than it should have to, for an object that lags behind it."""
+
+AHEADS = (0.0, -0.03, 0.03)
+ASIDES = (0.0, 0.025, -0.025)
+YAWS = np.radians([0.0, 90.0, 45.0, -45.0, 180.0, -90.0])
+
+EDGE_MARGIN = 0.02
+"""Metres by which the centre of mass, and the fingertips, stay inside the table's edges."""
+
+TIP_MARGIN = 0.004
+"""Metres that the fingertips stay inside the rim of the object's top."""
+
+LEVEL = 0.99
+"""Cosine of the angle off level up to which an object's top can be pressed on."""
+
+
+@dataclass(frozen=True)
+class Tips:
+    """Where the closed fingertips press: `ahead` metres before the object's centre along its way and `aside` metres to
+    the left of it, the hand turned by `yaw` rad about z."""
+
+    ahead: float
+    aside: float
+    yaw: float
+
+
+def ways_to_press(rng: np.random.Generator) -> list[Tips]:
+    """Where the fingertips may press, near the centre first."""
+    found = []
+    for ahead in AHEADS:
+        for aside in ASIDES:
+            for rank, yaw in enumerate(YAWS):
+                cost = 3.0 * (abs(ahead) + abs(aside)) + 0.02 * rank + 0.02 * rng.random()
+                found.append((cost, Tips(ahead, aside, float(yaw))))
+    return [tips for _, tips in sorted(found, key=lambda entry: entry[0])]
+
+
+def needed_force(body: Body, table: Table, pad_friction: float) -> float | None:
+    """Newtons from which on friction takes the object along; None if no force suffices.
+
+    Sliding with the hand needs f (µ_pad − µ_table) > µ_table m g, each µ the product of a pair.
+    """
+    grip = pad_friction * body.friction
+    drag = table.friction * body.friction
+    return drag * body.mass * GRAVITY / (grip - drag) if grip > drag else None
+
+
+def pressings(needed: float, stiffness: tuple[float, ...]) -> list[Pressing]:
+    """Ways to press when friction asks for `needed` N: first the force believed to be enough, then ever harder ones,
+    then slowly and more stiffly led."""
+    found: list[Pressing] = []
+    force = min(max(LEAST_FORCE, FORCE_FACTOR * needed), GREATEST_FORCE)
+    following: Pressing | None = Pressing(force, SPEED, stiffness)
+    while following is not None:
+        found.append(following)
+        following = harder(following)
+    return [*found, found[0].varied(speed=0.5), found[-1].varied(speed=0.5, stiffness=2.0, damping=1.5)]
+
+
+def harder(pressing: Pressing) -> Pressing | None:
+    """The next harder way to press; None at the limit."""
+    if pressing.force >= GREATEST_FORCE:
+        return None
+    return replace(pressing, force=min(pressing.force * HARDER, GREATEST_FORCE))
+
+
+def ways_of_pressing(toolkit: Toolkit, action: GroundAction, scene: SceneState) -> list[Pressing] | RefinementFailure:
+    """How the action's object can be pressed on so that it comes along, or why it can't."""
+    name = action.args[0]
+    body = scene.scenario.bodies[name]
+    if not has_level_top(body, scene.poses[name]):
+        reason = f"{name} has no level top to press on"
+        return RefinementFailure(action, reason, (Blocked(None, reason),))
+    needed = needed_force(body, scene.scenario.table, toolkit.robot.gripper.pad_friction)
+    if needed is None:
+        reason = "the fingertips have less friction on it than the table"
+        return RefinementFailure(action, reason, (Blocked(None, reason),))
+    if needed > GREATEST_FORCE:
+        reason = f"{name} would have to be pressed with {needed:.0f} N, the limit is {GREATEST_FORCE:.0f} N"
+        return RefinementFailure(action, reason, (Blocked(None, reason),))
+    return pressings(needed, toolkit.contact.stiffness)
+
+
+def press_pose(body: Body, X_WO: SE3, way: np.ndarray, tips: Tips) -> SE3:
+    """Pose X_WG of the hand with the fingertips on the object at X_WO that shall go along `way` (3,)."""
+    along = way / max(float(np.linalg.norm(way)), 1e-9)
+    left = np.array([-along[1], along[0], 0.0])
+    top = np.array([0.0, 0.0, height_above(body.shape, X_WO.rotation)])
+    p_WG = X_WO.translation + top + along * tips.ahead + left * tips.aside
+    return SE3(pin.rpy.rpyToMatrix(np.pi, 0.0, tips.yaw), p_WG)
+
+
+def tip_points(X_WG: SE3, gripper: Gripper) -> list[np.ndarray]:
+    """The corners (3,) of the patch that the closed fingertips cover, in W."""
+    x, y = gripper.pad[0] / 2, gripper.pad[1]
+    return [X_WG.act(np.array([sx * x, sy * y, 0.0])) for sx in (-1.0, 1.0) for sy in (-1.0, 1.0)]
+
+
+def has_level_top(body: Body, X_WO: SE3) -> bool:
+    """Is there a level face to press on?"""
+    match body.shape:
+        case Sphere():
+            return False
+        case Cylinder():
+            return abs(X_WO.rotation[2, 2]) > LEVEL
+        case Hull() | Compound():
+            return bool(tops(body.shape, X_WO.rotation[2], LEVEL))
+        case _:
+            return float(np.abs(X_WO.rotation[2]).max()) > LEVEL
+
+
+def is_on_top(body: Body, X_WO: SE3, points: list[np.ndarray]) -> bool:
+    """Do points of W lie over the object's top, inside its rim?"""
+    if isinstance(body.shape, Hull | Compound):
+        points_O = [X_WO.actInv(point) for point in points]
+        faces = tops(body.shape, X_WO.rotation[2], LEVEL)
+        return any(min(room_about(*face, point) for point in points_O) >= TIP_MARGIN for face in faces)
+    up = int(np.argmax(np.abs(X_WO.rotation[2])))
+    half = np.delete(extents(body.shape), up) / 2 - TIP_MARGIN
+    offsets = np.array([np.delete(X_WO.actInv(point), up) for point in points])
+    if isinstance(body.shape, Cylinder):
+        return bool(np.hypot(*offsets.T).max() <= half.min())
+    return bool(np.all(np.abs(offsets) <= half))
+
+
+def margin_inside(table: Table, p_W: np.ndarray) -> float:
+    """Metres that a point (3,) of W lies inside the nearest edge of the table; negative beyond it."""
+    p_T = np.abs(table.X_WT.actInv(p_W))[:2]
+    return float((np.array(table.size[:2]) / 2 - p_T).min())
+
+
+def footprint(body: Body, X_WO: SE3) -> list[np.ndarray]:
+    """The corners (3,) of the object's bounding box in W."""
+    half, centre = extents(body.shape) / 2, middle(body.shape)
+    return [X_WO.act(centre + half * (2.0 * np.array(signs) - 1.0)) for signs in np.ndindex(2, 2, 2)]
+
+
+def tow(
+    toolkit: Toolkit, action: GroundAction, scene: SceneState, X_WO_end: SE3, tips: Tips, pressing: Pressing
+) -> tuple[Phase, ...] | MotionFailure | Unfit:
+    """The motion that takes the action's object along to X_WO_end, and the hand up from it.
+
+    The hand's path goes on beyond that by RESERVE, as far as the fingertips stay above the table.
+    """
+    name, surface = action.args[:2]
+    robot = toolkit.robot
+    body = scene.scenario.bodies[name]
+    X_WO = scene.poses[name]
+    way = X_WO_end.translation - X_WO.translation
+    X_WG = press_pose(body, X_WO, way, tips)
+    X_WG_end = shifted(X_WG, way)
+    X_WG_last = shifted(X_WG_end, way / max(float(np.linalg.norm(way)), 1e-9) * _reserve(toolkit, scene, X_WG_end))
+
+    ready = replace(scene, opening=0.0)
+    along_with = Held(name, X_WG.actInv(X_WO))
+    dragging = replace(ready, held=along_with)
+    touching = pairs(robot.finger_links, name)
+    sliding = touching | pairs(name, surface)
+    moved = ready.moved(name, X_WO_end)
+    waypoints = (
+        raised(X_WG, HEIGHT),
+        raised(X_WG, CLOSE),
+        X_WG,
+        raised(X_WG, -PROBE),
+        X_WG,
+        X_WG_last,
+        X_WG_end,
+        raised(X_WG_end, HEIGHT),
+    )
+
+    def lines(legs: Legs) -> tuple[Line, ...]:
+        down, near, probe, _, along, _, up = legs
+        return (
+            Line(dragging, along, pressing.speed, sliding),
+            Line(ready, down, NEAR_SPEED, touching),
+            Line(ready, np.vstack([near, probe[1:]]), TOUCH_SPEED, touching, checked=len(near)),
+            Line(moved, up, NEAR_SPEED, touching),
+        )
+
+    way = find_way(toolkit, waypoints, ready, lines)
+    if not isinstance(way, Way):
+        return way
+    along, down, probe, up = way.lines
+    press = pressing.press
+    return (
+        Phase("close", "open", way.reach.standstill(scene.q), 0.0),
+        Phase("pre-drag", "move", way.reach, 0.0),
+        Phase("approach", "approach", down, 0.0, None, touching),
+        Phase("descend", "touch", probe, 0.0, None, sliding, press),
+        Phase("drag", "slide", along, 0.0, along_with, sliding, press),
+        Phase("retract", "approach", up, 0.0, None, sliding),
+    )
+
+
+def _reserve(toolkit: Toolkit, scene: SceneState, X_WG_end: SE3) -> float:
+    """Metres that the hand may go on in any direction with its fingertips EDGE_MARGIN inside the table's edges."""
+    table = scene.scenario.table
+    inside = min(margin_inside(table, point) for point in tip_points(X_WG_end, toolkit.robot.gripper))
+    return float(np.clip(inside - EDGE_MARGIN, 0.0, RESERVE))

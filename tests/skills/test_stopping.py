@@ -1,0 +1,46 @@
+"""An arm that is pushed while it moves: it stops, says so, and goes on when asked again."""
+
+import numpy as np
+from bench import Bench, action, scene_with
+from py_trees.common import Status
+from py_trees.trees import BehaviourTree
+
+from planner.failure import ArmStopped
+from skills.context import ActionRun
+from skills.lift_off import LiftOff
+
+
+def ended(bench: Bench, root) -> Status:
+    """Tick a tree to its end."""
+    tree = BehaviourTree(root)
+    for _ in range(1500):
+        tree.tick()
+        if root.status is not Status.RUNNING:
+            return root.status
+        bench.run(10)
+    raise AssertionError(f"{root.name} did not end")
+
+
+def test_a_push_in_the_middle_of_a_motion_stops_the_arm_and_the_action_works_when_begun_again():
+    bench = Bench(scene_with("box"))
+    step = bench.plant.step
+    pushed = []
+
+    def shoving_step() -> None:
+        if 0.6 < bench.context.observation.t < 0.7:
+            bench.plant.push(np.array([0.0, 100.0, 0.0]), "link_5")
+            pushed.append(bench.context.observation.t)
+        step()
+
+    bench.plant.step = shoving_step
+    pick = action("pick(box, table)")
+    assert ended(bench, bench.skills["pick"].subtree(ActionRun(pick), bench.context)) is Status.FAILURE
+    assert pushed
+    assert isinstance(bench.context.failure, ArmStopped)
+    assert "pushes joint" in bench.context.failure.reason
+
+    bench.context.failure = None
+    assert ended(bench, LiftOff(bench.context)) is Status.SUCCESS
+    assert bench.context.controller.stopped is None
+    assert bench.do("pick(box, table)") is Status.SUCCESS
+    assert bench.scene.held is not None
