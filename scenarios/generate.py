@@ -175,7 +175,8 @@ def _scene(plan: Plan, pan: float, groups: list[Group], spots: list[Spot], spoil
     literals = []
     for group, spot in zip(groups, spots, strict=True):
         for piece in group.pieces:
-            data["objects"][piece.name] = _thing(piece, spot, side, colors[len(literals) % len(colors)])
+            thing = _thing(piece, spot, side, colors[len(literals) % len(colors)])
+            data["objects"][piece.name] = thing | {"noise": _noise(group, plan)}
             literals.append(_literal(piece, data["objects"][piece.name], bins, plan))
     if has_pan:
         data["tools"] = {"sponge": _sponge(pan, side)}
@@ -205,6 +206,13 @@ def _thing(piece: Piece, spot: Spot, side: float, color: str) -> dict[str, Any]:
     return {"shape": piece.ware.shape, "mass": mass, "friction": 0.55, "color": color, "pose": pose}
 
 
+def _noise(group: Group, plan: Plan) -> dict[str, float]:
+    """Start noise small enough that what must come first still must, and that room for the fingers stays."""
+    if len(group.pieces) > 1:
+        return {"xy": 0.002, "yaw_deg": 2.0}
+    return {"xy": number(plan.margin / 4), "yaw_deg": 5.0}
+
+
 def _turned(p: tuple[float, float], turn: float) -> np.ndarray:
     c, s = np.cos(turn), np.sin(turn)
     return np.array([c * p[0] - s * p[1], s * p[0] + c * p[1]])
@@ -227,6 +235,7 @@ def _sponge(pan: float, side: float) -> dict[str, Any]:
         "mass": 0.06,
         "friction": 0.5,
         "pose": {"on": "dustpan", "xy": [number(pan), number(-0.35 * side)]},
+        "noise": {"xy": 0.005, "yaw_deg": 4.0},
     }
 
 

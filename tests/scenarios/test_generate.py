@@ -83,6 +83,15 @@ def test_a_chain_has_three_links_and_what_is_put_aside_stands_on_something(table
             assert not on_top
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_tables_start_varies_with_the_runs_seed(seed):
+    document = parse_document(generate(seed, 4 + seed % 9), "generated")
+    starts = [build_scenario(document, run).bodies for run in range(4)]
+    for name, body in starts[0].items():
+        moves = [np.linalg.norm(start[name].X_WO.translation - body.X_WO.translation) for start in starts[1:]]
+        assert 0.0005 < max(moves) < 0.01
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_unsolvable_table_has_the_flaw_it_is_named_for(kind):
     scenario = _table(4, 5, kind)
