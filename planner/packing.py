@@ -2,8 +2,11 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
+import numpy as np
+
 from planner.placements import Placement
 from scenarios.scenario import Body
+from scenarios.shapes import bounding_radius
 from scenarios.solids import Solid, body_solid, overlap
 from sim.scene import SceneState
 
@@ -23,9 +26,13 @@ def clear_first(samples: Iterable[Placement], body: Body, others: Sequence[Solid
     """The placements after which the body overlaps none of the others, as they come; then the rest, so that failing
     with them tells who is in the way."""
     blocked = []
+    centres = np.array([other.ball[0] for other in others]).reshape(-1, 3)
+    reach = np.array([other.ball[1] for other in others]) + bounding_radius(body.shape)
     for sample in samples:
-        at_rest = body_solid(body, sample.X_WO_rest)
-        if any(overlap(at_rest, other, DEPTH) for other in others):
+        X_WO = sample.X_WO_rest
+        near = np.flatnonzero(np.linalg.norm(centres - X_WO.translation, axis=1) < reach)
+        at_rest = body_solid(body, X_WO) if len(near) else None
+        if at_rest is not None and any(overlap(at_rest, others[int(k)], DEPTH) for k in near):
             blocked.append(sample)
         else:
             yield sample

@@ -6,7 +6,7 @@ tilted so that the hand points down into a container; then it falls the rest of 
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -90,7 +90,8 @@ def top_of(shape: Shape, X_WO: SE3) -> Surface | None:
     axis = int(np.argmax(np.abs(up_O)))
     if abs(up_O[axis]) < UPRIGHT:
         return None
-    R = X_WO.rotation @ _turn_down(-np.sign(up_O[axis]) * np.eye(3)[axis]).T
+    down_O = -np.sign(up_O[axis]) * np.eye(3)[axis]
+    R = X_WO.rotation @ _turn_down((float(down_O[0]), float(down_O[1]), float(down_O[2]))).T
     yaw = pin.rpy.rpyToMatrix(0.0, 0.0, float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])))
     half = np.abs(yaw.T @ X_WO.rotation) @ extents(shape) / 2
     centre = X_WO.translation + np.array([0.0, 0.0, height_above(shape, X_WO.rotation)])
@@ -120,11 +121,11 @@ def placements(
             if (R_target := _turned(R_upright, X_GO, float(tilt), float(yaw), surface)) is not None
         ]
         found.sort(key=lambda way: way[:2])
+        fits = [_fit(shape, surface, R_target) for _, _, R_target in found]
         for _ in range(spots):
-            for _, _, R_target in found:
-                placement = _placement(shape, surface, R_target, rng)
-                if placement is not None:
-                    yield placement
+            for fit in fits:
+                if fit is not None:
+                    yield _placement(surface, fit, rng)
 
 
 def _turned(R_upright: np.ndarray, X_GO: SE3, tilt: float, yaw: float, surface: Surface) -> np.ndarray | None:
@@ -140,7 +141,22 @@ def _turned(R_upright: np.ndarray, X_GO: SE3, tilt: float, yaw: float, surface: 
     return surface.X_WS.rotation @ pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ R_WO
 
 
-def _placement(shape: Shape, surface: Surface, R_WO: np.ndarray, rng: np.random.Generator) -> Placement | None:
+@dataclass(frozen=True)
+class _Fit:
+    """One way to turn the object above a surface: R_SO at release and at rest, how far it moves in the plane as it
+    falls (2,), its height above the surface at release and at rest, and the middle (2,) and half size (2,) of where
+    its centre may be released."""
+
+    R_SO: np.ndarray
+    R_rest: np.ndarray
+    shift: np.ndarray
+    heights: tuple[float, float]
+    middle: np.ndarray
+    room: np.ndarray
+
+
+def _fit(shape: Shape, surface: Surface, R_WO: np.ndarray) -> _Fit | None:
+    """None if the surface has no room for the object when it is turned like this."""
     R_SO = surface.X_WS.rotation.T @ R_WO
     R_rest, shift = _fallen(shape, R_SO)
     half = surface.half - (WALL_GAP if surface.wall > 0.0 else EDGE_GAP)
@@ -149,11 +165,16 @@ def _placement(shape: Shape, surface: Surface, R_WO: np.ndarray, rng: np.random.
     room = (upper - lower) / 2
     if np.any(room < 0.0):
         return None
+    heights = depth_below(shape, R_SO) + DROP, depth_below(shape, R_rest)
+    return _Fit(R_SO, R_rest, shift, heights, (upper + lower) / 2, room)
+
+
+def _placement(surface: Surface, fit: _Fit, rng: np.random.Generator) -> Placement:
     along = rng.uniform(-1.0, 1.0, 2)
-    spread = room * (np.sign(along) * np.abs(along) ** OUTWARDS if surface.wall > 0.0 else along)
-    spot = (upper + lower) / 2 + spread
-    X_WO = surface.X_WS * SE3(R_SO, np.array([*spot, depth_below(shape, R_SO) + DROP]))
-    X_rest = surface.X_WS * SE3(R_rest, np.array([*(spot + shift), depth_below(shape, R_rest)]))
+    spread = fit.room * (np.sign(along) * np.abs(along) ** OUTWARDS if surface.wall > 0.0 else along)
+    spot = fit.middle + spread
+    X_WO = surface.X_WS * SE3(fit.R_SO, np.array([*spot, fit.heights[0]]))
+    X_rest = surface.X_WS * SE3(fit.R_rest, np.array([*(spot + fit.shift), fit.heights[1]]))
     return Placement(_numbers(X_WO), _numbers(X_rest))
 
 
@@ -167,13 +188,14 @@ def _uprights(shape: Shape, X_GO: SE3, may_roll: bool) -> list[np.ndarray]:
     for rest in rests(shape):
         downward = float(approach_O @ np.array(rest.down))
         if rest.is_firm and downward > -LEVEL and (may_roll or not rest.rolls):
-            found.append((-round(downward, 6), len(found), _turn_down(np.array(rest.down))))
+            found.append((-round(downward, 6), len(found), _turn_down(rest.down)))
     return [R for _, _, R in sorted(found, key=lambda entry: entry[:2])]
 
 
-def _turn_down(down_O: np.ndarray) -> np.ndarray:
+@lru_cache(maxsize=1024)
+def _turn_down(down_O: tuple[float, float, float]) -> np.ndarray:
     """A rotation that takes the object's direction `down_O` to −z of the world."""
-    z = -down_O
+    z = -np.array(down_O)
     across = np.roll(z, 1)
     x = across - (across @ z) * z
     if np.linalg.norm(x) < 0.1:
@@ -188,8 +210,8 @@ def _fallen(shape: Shape, R_SO: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Returns the rotation R_SO at rest and how far the centre moves in the plane (2,), in metres.
     """
-    downs = np.array([rest.down for rest in rests(shape)])
-    flat = _turn_down(downs[int(np.argmax(downs @ -R_SO[2]))])
+    downs = [rest.down for rest in rests(shape)]
+    flat = _turn_down(downs[int(np.argmax(np.array(downs) @ -R_SO[2]))])
     delta = R_SO @ flat.T
     yaw = np.arctan2(delta[1, 0] - delta[0, 1], delta[0, 0] + delta[1, 1])
     R_rest = pin.rpy.rpyToMatrix(0.0, 0.0, float(yaw)) @ flat

@@ -197,6 +197,7 @@ def reach(shape: Shape, direction: np.ndarray) -> float:
             return max(r + float(part.X_OP.translation @ direction) for r, part in zip(ahead, parts, strict=True))
 
 
+@lru_cache(maxsize=1024)
 def bounding_radius(shape: Shape) -> float:
     """Radius in metres of the smallest sphere about the origin that holds the shape; of a compound's parts' spheres."""
     match shape:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import coal
 import numpy as np
@@ -29,6 +29,13 @@ class Solid:
         """Centre of volume (3,) in W."""
         weights = np.array([volume(shape) for shape, _ in self.parts])
         return weights @ np.array([X_WP.translation for _, X_WP in self.parts]) / weights.sum()
+
+    @cached_property
+    def ball(self) -> tuple[np.ndarray, float]:
+        """Centre (3,) in W and radius of a sphere that holds the whole thing."""
+        centre = np.mean([X_WP.translation for _, X_WP in self.parts], axis=0)
+        reach = [np.linalg.norm(X_WP.translation - centre) + bounding_radius(shape) for shape, X_WP in self.parts]
+        return centre, float(max(reach))
 
     def moved(self, X_WW: SE3) -> "Solid":
         """The same thing after a rigid motion of the world."""
