@@ -20,6 +20,7 @@ from scenarios.shapes import (
     convex_parts,
     extents,
     inertia,
+    inscribed_radius,
     middle,
     outline,
     reach,
@@ -112,3 +113,21 @@ def test_a_shape_about_another_origin_is_refused():
         Hull(tuple(map(tuple, CUBE)))
     with pytest.raises(ShapeError, match="1 to 64"):
         Compound(())
+
+
+@pytest.mark.parametrize("shape", _shapes())
+def test_the_inscribed_ball_lies_inside_the_shape(shape):
+    radius = inscribed_radius(shape)
+    directions = np.random.default_rng(1).normal(size=(200, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    assert radius <= min(reach(shape, d) for d in directions)
+    solids = [(outline(part), X_OP) for part, X_OP in convex_parts(shape)]
+    # Outlines of what is round are cut flat.
+    points = 0.95 * radius * directions
+    assert radius == 0.0 or all(any(solid.outside(X_OP.actInv(p)) < 0.0 for solid, X_OP in solids) for p in points)
+
+
+def test_a_mugs_hollow_has_no_inscribed_ball_and_a_hulls_is_that_of_its_nearest_face():
+    assert inscribed_radius(_mug()) == 0.0
+    assert inscribed_radius(Hull.of(CUBE)[0]) == pytest.approx(0.05)
+    assert inscribed_radius(Compound.of([(Box((0.1, 0.2, 0.3)), _at(0, 0, 0))])[0]) == pytest.approx(0.05)
