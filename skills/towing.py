@@ -14,8 +14,9 @@ from planner.failure import Blocked, MotionFailure, RefinementFailure
 from planner.refinement import Phase, pairs
 from planner.stability import room_about, tops
 from planner.task.symbols import GroundAction
-from scenarios.scenario import Body, Table
+from scenarios.scenario import Body, Scenario, Table
 from scenarios.shapes import Compound, Cylinder, Hull, Sphere, extents, middle
+from scenarios.solids import body_solid, overlap, region_solid
 from sim.robot import GRAVITY, Gripper
 from sim.scene import Held, SceneState, height_above
 from skills.pressing import Pressing
@@ -53,6 +54,12 @@ EDGE_MARGIN = 0.02
 
 TIP_MARGIN = 0.004
 """Metres that the fingertips stay inside the rim of the object's top."""
+
+LOOK = 0.02
+"""Metres between the poses at which an object's way is looked at before a motion is sought."""
+
+DEPTH = 0.002
+"""Metres by which what is believed of poses may have things overlap that don't."""
 
 LEVEL = 0.99
 """Cosine of the angle off level up to which an object's top can be pressed on."""
@@ -171,6 +178,21 @@ def margin_inside(table: Table, p_W: np.ndarray) -> float:
     """Metres that a point (3,) of W lies inside the nearest edge of the table; negative beyond it."""
     p_T = np.abs(table.X_WT.actInv(p_W))[:2]
     return float((np.array(table.size[:2]) / 2 - p_T).min())
+
+
+def fixed_in_way(scenario: Scenario, body: Body, X_WO: SE3, X_WO_end: SE3) -> str | None:
+    """The name of a fixture or region that the object would run into on its straight way, or None."""
+    fixed = [body_solid(fixture) for fixture in scenario.fixtures.values()]
+    fixed += [region_solid(region) for region in scenario.regions.values()]
+    way = X_WO_end.translation - X_WO.translation
+    steps = max(1, int(np.ceil(float(np.linalg.norm(way)) / LOOK)))
+    # Beginning with the end, which is where most ways are blocked.
+    for step in range(steps, 0, -1):
+        there = body_solid(body, shifted(X_WO, way * step / steps))
+        hit = next((other.name for other in fixed if overlap(there, other, DEPTH)), None)
+        if hit is not None:
+            return hit
+    return None
 
 
 def footprint(body: Body, X_WO: SE3) -> list[np.ndarray]:

@@ -13,6 +13,7 @@ from bt_tamp.options import RunOptions
 from planner.failure import RefinementFailure
 from planner.refinement import Budget, Hints, Refinement, Work
 from planner.task.facts import goal_facts, place_of
+from scenarios.scenario import Fixture
 from scenarios.shapes import Box, Compound, Cylinder, Hull, Sphere, bounds
 from skills.drag import OVERHANGS, Pull, edge_normal, ends, standing_out
 from skills.pick import Pick
@@ -265,3 +266,19 @@ def test_only_the_highest_flat_faces_are_pressed_on():
         np.array([(x, y, 0.0) for x in (-0.05, 0.05) for y in (-0.05, 0.05)] + [(0.0, y, 0.04) for y in (-0.05, 0.05)])
     )[0]
     assert not has_level_top(replace(body, shape=roof), X_WO)
+
+
+def test_walls_along_all_edges_are_named_as_what_keeps_an_object_from_being_dragged_over_one():
+    scenario = with_pose(scene_with("book"), "book", 0.6, -0.05)
+    (x, y, _), (width, depth, _) = scenario.table.X_WT.translation, scenario.table.size
+    sides = [(x + s * (width / 2 - 0.006), y, (0.012, depth, 0.05)) for s in (-1, 1)]
+    sides += [(x, y + s * (depth / 2 - 0.006), (width, 0.012, 0.05)) for s in (-1, 1)]
+    walls = {
+        f"wall_{k}": Fixture(f"wall_{k}", Box(size), SE3(np.eye(3), np.array([x, y, 0.075])), 0.5, (1.0, 1.0, 1.0, 1.0))
+        for k, (x, y, size) in enumerate(sides)
+    }
+    bench = Bench(replace(scenario, fixtures=walls))
+    failure = bench.refine(DRAG)
+    assert isinstance(failure, RefinementFailure)
+    assert "wall_" in failure.reason
+    assert not failure.culprit_sets
