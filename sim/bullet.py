@@ -38,10 +38,15 @@ CONTACT_BREAKING = 0.002
 """Metres after which a contact point is given up. With Bullet's own 0.02 stale points under the pads let a book
 turn in the hand by 3° a second while everything stands still."""
 
-RESISTANCE = 0.001
-"""Metres, before it is multiplied by the other body's friction: lever of the force that resists rolling on what stands
-fast, as of things on wood, and turning on the spot, as of things between rubber pads. Without it a glass on its rim or
-a ball never come to rest, and a soft thing turns in the hand."""
+ROTATION_DAMPING = 2.0
+"""1/s at which a thing's turning dies away: without it a glass on its rim or a ball never come to rest. Bullet's own
+rolling friction does it too, but doubles the cost of every contact."""
+
+PAD_RESISTANCE = 0.003
+"""Metres, before it is multiplied by the friction of what is held: lever of the force with which the pads resist
+turning on the spot, that of a round patch 9 mm across (two thirds of its radius). A point contact resists nothing, and
+what is held would swing. PyBullet's wrist sensor leaves these torques out, some 0.1 Nm: forces are felt rightly, so a
+load's mass is, but not where its centre lies."""
 
 FLOOR_FRICTION = 0.8
 GEAR_STIFFNESS = 2e4
@@ -95,9 +100,9 @@ class BulletPlant:
         self._free()
 
     def observe(self) -> Observation:
-        arm = p.getJointStates(self._robot, self._arm_joints, physicsClientId=self._client)
-        fingers = p.getJointStates(self._robot, self._finger_joints, physicsClientId=self._client)
-        sensor = p.getJointState(self._robot, self._sensor_joint, physicsClientId=self._client)[2]
+        states = p.getJointStates(self._robot, self._joints, physicsClientId=self._client)
+        q, v, reactions, drives = zip(*states, strict=True)
+        sensor = reactions[-1]
         # PyBullet reports the joint's reaction about the child link's centre of mass, on the child.
         force = -np.array(sensor[:3])
         poses, velocities = {}, {}
@@ -112,12 +117,12 @@ class BulletPlant:
             velocities[name] = linear + angular
         return Observation(
             t=self._t,
-            q=np.array([state[0] for state in arm]),
-            v=np.array([state[1] for state in arm]),
+            q=np.array(q[:7]),
+            v=np.array(v[:7]),
             tau=self._tau.copy(),
-            opening=fingers[0][0] + fingers[1][0],
-            opening_velocity=fingers[0][1] + fingers[1][1],
-            grip_force=(abs(fingers[0][3]) + abs(fingers[1][3])) / 2,
+            opening=q[7] + q[8],
+            opening_velocity=v[7] + v[8],
+            grip_force=(abs(drives[7]) + abs(drives[8])) / 2,
             wrist=Wrench(force, self._lever @ force - np.array(sensor[3:])),
             poses=_Converted(poses, _pose),
             velocities=_Converted(velocities, np.array),
@@ -239,9 +244,9 @@ class BulletPlant:
             add_visual_shape(shape, self._client, rgbaColor=color, **frame),
             list(pose[:3]),
             list(pose[3:]),
-            # As a multibody, PyBullet's default, a thing costs several times as much, and what the pads do against its
-            # turning never reaches the wrist sensor.
-            useMaximalCoordinates=True,
+            # In maximal coordinates, which cost less, a pushed cube drifts aside by a tenth of its way and a pressed
+            # sponge rings by 5 % of the force.
+            useMaximalCoordinates=False,
             physicsClientId=self._client,
         )
         if axes is not None:
@@ -257,11 +262,9 @@ class BulletPlant:
             body,
             -1,
             lateralFriction=friction,
-            rollingFriction=RESISTANCE if mass == 0.0 else 0.0,
-            spinningFriction=RESISTANCE,
             restitution=0.0,
             linearDamping=0.0,
-            angularDamping=0.0,
+            angularDamping=ROTATION_DAMPING,
             activationState=p.ACTIVATION_STATE_DISABLE_SLEEPING,
             physicsClientId=self._client,
         )
@@ -325,6 +328,7 @@ class BulletPlant:
         self._arm_joints = [index[f"joint_{i}"] for i in range(1, 8)]
         self._finger_joints = [index["finger_left_slide"], index["finger_right_slide"]]
         self._sensor_joint = index["wrist_sensor"]
+        self._joints = [*self._arm_joints, *self._finger_joints, self._sensor_joint]
         self._tcp_link = index["tcp_mount"]
         hand = p.getDynamicsInfo(self._robot, self._sensor_joint, physicsClientId=self._client)
         self._lever = pin.skew(np.array(hand[3]))
@@ -339,7 +343,11 @@ class BulletPlant:
             )
         for finger in self._finger_joints:
             p.changeDynamics(
-                self._robot, finger, lateralFriction=robot.gripper.pad_friction, physicsClientId=self._client
+                self._robot,
+                finger,
+                lateralFriction=robot.gripper.pad_friction,
+                spinningFriction=PAD_RESISTANCE,
+                physicsClientId=self._client,
             )
         p.setJointMotorControlArray(
             self._robot, self._arm_joints, p.VELOCITY_CONTROL, forces=[0.0] * 7, physicsClientId=self._client

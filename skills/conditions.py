@@ -18,12 +18,16 @@ EFFECT_TIME = 1.5
 
 
 class HandHolds(Behaviour):
-    """Is it still in the hand, where it was when the guard began to look? `name` None: whatever is held then."""
+    """Is it still in the hand, where it was when the guard began to look? `name` None: whatever is held then.
 
-    def __init__(self, name: str | None, run: ActionRun, context: SkillContext) -> None:
+    turn: rad by which it may have turned there.
+    """
+
+    def __init__(self, name: str | None, run: ActionRun, context: SkillContext, turn: float = SLIP_ANGLE) -> None:
         super().__init__("still held?" if name is None else f"{name} held?")
         self._expected = name
         self._run, self._context = run, context
+        self._turn = turn
         self._grip: Held | None = None
 
     def update(self) -> Status:
@@ -34,7 +38,7 @@ class HandHolds(Behaviour):
         if self._grip is None or self._grip.name != held.name:
             self._grip = held
         distance, angle = pose_distance(self._grip.X_GO, held.X_GO)
-        if distance > SLIP_DISTANCE or angle > SLIP_ANGLE:
+        if distance > SLIP_DISTANCE or angle > self._turn:
             return self._slipped(f"{held.name} slipped {distance * 1000:.0f} mm, {np.degrees(angle):.0f}° in the hand")
         return Status.SUCCESS
 

@@ -60,6 +60,11 @@ def wider_than(place: Region | Table, shape: Shape) -> str | None:
     )
 
 
+CARRIED_TURN = np.radians(30.0)
+"""How far an object may have turned in the hand on its way. PyBullet lets a soft one turn by a twelfth of how far the
+hand is swung round, and it may be swung right round."""
+
+
 class Place:
     """`place(object, place)`: a release pose found by sampling; straight down to it, open, straight back."""
 
@@ -101,7 +106,7 @@ class Place:
         carry = guarded("carry", Refine(run, context, self._kit.motion), lower)
         return sequence(
             str(run.action),
-            guarded("hold", HandHolds(name, run, context), carry),
+            guarded("hold", HandHolds(name, run, context, CARRIED_TURN), carry),
             Open("open", run, context),
             Follow("retreat", run, context),
             Achieved(lambda scene: scene.held is None and place_of(scene, name) == goal, run, context),

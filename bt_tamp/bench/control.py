@@ -1,10 +1,11 @@
 """`bench control`: what one control tick costs, part by part, beside the bare physics that it drives."""
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -18,6 +19,8 @@ from bt_tamp.report.folder import RunFolder
 from bt_tamp.report.recorder import RunRecorder
 from scenarios.load import load_scenario
 
+WHAT = "runs"
+SEEDS = (0, 1, 2)
 SCENE = "fig1_wipe"
 WIPING = frozenset({"touch", "slide"})
 FREE = frozenset({"move", "approach"})
@@ -58,7 +61,34 @@ class Cost:
         return self.parts["physics"]
 
 
-def measure(seed: int) -> list[Cost]:
+Run = Sequence[Cost]
+
+
+def planned(quick: bool) -> Sequence[int]:
+    """Seeds of the runs."""
+    return SEEDS[:1] if quick else SEEDS
+
+
+def measure(seeds: Sequence[int], done: Callable[[Run], None]) -> list[Run]:
+    """Run them one after the other; `done` is told of each."""
+    runs = []
+    for seed in seeds:
+        runs.append(run(seed))
+        done(runs[-1])
+    return runs
+
+
+def said(costs: Run) -> str:
+    """A run in a line."""
+    return f"{SCENE}, real-time factor " + ", ".join(f"{cost.regime} {cost.real_time:.2f}" for cost in costs)
+
+
+def records(runs: Sequence[Run]) -> list[dict[str, Any]]:
+    """For JSON: what is printed."""
+    return [asdict(cost) for cost in middle(runs)]
+
+
+def run(seed: int) -> Run:
     """Clear SCENE's table, recorded like any run, until enough was seen of moving freely and of wiping.
 
     Raises ValueError if no stroke comes within LONGEST simulated seconds.
@@ -102,15 +132,15 @@ def _cost(regime: str, watch: Stopwatch, simulated: float, real: float) -> Cost:
     return Cost(regime, simulated, parts, qp, simulated / real)
 
 
-def middle(runs: Sequence[Sequence[Cost]]) -> list[Cost]:
+def middle(runs: Sequence[Run]) -> list[Cost]:
     """Of several runs, for each regime, the one in the middle by its real-time factor: other load comes and goes."""
     regimes = zip(*runs, strict=True)
     return [sorted(costs, key=lambda cost: cost.real_time)[len(costs) // 2] for costs in regimes]
 
 
-def acceptance(costs: Sequence[Cost]) -> list[Check]:
+def acceptance(runs: Sequence[Run]) -> list[Check]:
     """The figures to reach."""
-    wiping = [cost for cost in costs if cost.regime == "wiping"]
+    wiping = [cost for cost in middle(runs) if cost.regime == "wiping"]
     shares = [cost.control / cost.physics for cost in wiping]
     return [
         at_most("wiping: control and tree, as a share of the bare physics", shares, 1.0, "times"),
@@ -119,8 +149,9 @@ def acceptance(costs: Sequence[Cost]) -> list[Check]:
     ]
 
 
-def print_costs(console: Console, costs: Sequence[Cost]) -> None:
+def print_results(console: Console, runs: Sequence[Run]) -> None:
     """The table: one line a part."""
+    costs = middle(runs)
     table = Table(
         caption=f"µs of CPU time a control tick (2 ms simulated: {CONTROL_EVERY} physics steps), mean over {SCENE}",
         caption_justify="left",

@@ -2,7 +2,8 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -19,6 +20,7 @@ from scenarios.shapes import Box
 from sim.plant import Observation
 from sim.scene import depth_below
 
+WHAT = "boxes"
 QUICK = 6
 """Boxes of a first look."""
 
@@ -144,6 +146,16 @@ def _edge(table: Table, p_WO: np.ndarray | None) -> str:
         for sign, side in (("+", 1.0), ("-", -1.0))
     }
     return min(gaps, key=lambda name: gaps[name])
+
+
+def said(result: DragResult) -> str:
+    """A box in a line."""
+    return f"to {result.edge}: {'held' if result.is_held else result.reason}"
+
+
+def records(results: Sequence[DragResult]) -> list[dict[str, Any]]:
+    """For JSON."""
+    return [asdict(result) for result in results]
 
 
 COLUMNS = (

@@ -1,8 +1,9 @@
 """`bench force`: slides on a table, by different laws and under disturbances, side by side."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import groupby, product
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -13,6 +14,7 @@ from bt_tamp.bench.slide import Case, Law, SlideResult, run_slide
 from sim.disturbance import Fault, ForceBias, ForceDelay, ForceNoise, JointFriction
 from sim.robot import WSG50
 
+WHAT = "slides"
 TARGETS = (5.0, 10.0, 20.0, 40.0)
 LAWS: tuple[Law, ...] = ("hybrid", "open-loop PD hybrid", "impedance, paper's gains", "impedance, tuned")
 KNOWN = "everything known"
@@ -49,6 +51,11 @@ PRESSES = {
 """Height and stiffness that go together: on a higher table a softer sponge would be pressed flat to the fingertips."""
 
 
+def planned(quick: bool) -> list[Case]:
+    """The slides to measure; a first look is at 10 N only."""
+    return list(cases((10.0,) if quick else TARGETS, quick))
+
+
 def cases(targets: Sequence[float], quick: bool) -> Iterator[Case]:
     """Every slide, laws first."""
     yield from (Case(KNOWN, law, target) for target in targets for law in LAWS)
@@ -67,13 +74,18 @@ def _together() -> Iterator[tuple[str, Truth]]:
         yield f"{TOGETHER}: {signs}", Truth(height, TILT, friction, stiffness, masses)
 
 
-def measure(planned: Sequence[Case], told: Callable[[SlideResult], None]) -> list[SlideResult]:
+def measure(slides: Sequence[Case], told: Callable[[SlideResult], None]) -> list[SlideResult]:
     """Run them one after the other; `told` hears of each."""
     results = []
-    for case in planned:
+    for case in slides:
         results.append(run_slide(case))
         told(results[-1])
     return results
+
+
+def said(result: SlideResult) -> str:
+    """A slide in a line."""
+    return f"{result.case}, {result.law}, {result.target:g} N: {result.ended}"
 
 
 def acceptance(results: Sequence[SlideResult]) -> list[Check]:
@@ -104,6 +116,11 @@ def acceptance(results: Sequence[SlideResult]) -> list[Check]:
             "QP, build and solve, median", [float(np.median([r.qp_us for r in hybrid]))] if hybrid else [], 120.0, "µs"
         ),
     ]
+
+
+def records(results: Sequence[SlideResult]) -> list[dict[str, Any]]:
+    """For JSON."""
+    return [asdict(thinned(result)) for result in results]
 
 
 def about_100_newtons() -> str:
@@ -146,6 +163,7 @@ def print_results(console: Console, results: Sequence[SlideResult]) -> None:
     lines.append("mean (off by), RMS: true normal force from 0.5 s after touchdown to the command to lift")
     lines.append("overshoot: of the target, within those 0.5 s; airborne: time without contact since touchdown")
     console.print("\n".join(lines), highlight=False, markup=False, soft_wrap=True)
+    console.print(about_100_newtons(), highlight=False)
 
 
 def _group(results: Sequence[SlideResult]) -> Callable[[SlideResult], int]:

@@ -1,24 +1,21 @@
 """Pictures of what a benchmark measured. Matplotlib is an extra: without it there are none."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+from bt_tamp.bench.control import PARTS, Cost, middle
+from bt_tamp.bench.drag import DragResult
 from bt_tamp.bench.slide import SlideResult
+from bt_tamp.bench.wipe import WipeResult
+from sim.robot import GRAVITY
 
 
 def plot_forces(folder: Path, results: Sequence[SlideResult]) -> list[Path]:
-    """One PNG a target: the laws beside each other, and hybrid control under every disturbance. Returns the files.
-
-    Raises ImportError without matplotlib.
-    """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
+    """One PNG a target: the laws beside each other, and hybrid control under every disturbance."""
     made = []
     for target in sorted({r.target for r in results}):
-        figure, (above, below) = plt.subplots(2, 1, figsize=(9, 9), sharex=True, layout="constrained")
+        figure, (above, below) = _figure(2, sharex=True)
         mine = [r for r in results if r.target == target]
         known = [r for r in mine if r.case == mine[0].case]
         for result in known:
@@ -34,8 +31,75 @@ def plot_forces(folder: Path, results: Sequence[SlideResult]) -> list[Path]:
             axes.set_ylabel("true normal force, N")
         above.legend(loc="lower right")
         below.set_xlabel("seconds since touchdown")
-        path = folder / f"force-{target:g}N.png"
-        figure.savefig(path, dpi=120)
-        plt.close(figure)
-        made.append(path)
+        made.append(_saved(figure, folder / f"force-{target:g}N.png"))
     return made
+
+
+def plot_wipes(folder: Path, results: Sequence[WipeResult]) -> list[Path]:
+    """Crumbs by layout, those in the dustpan and those missed, and how many strokes each layout took."""
+    figure, (above, below) = _figure(2, sharex=True)
+    places = range(1, len(results) + 1)
+    inside = [r.inside for r in results]
+    above.bar(places, inside, color="C2", label="in the dustpan")
+    above.bar(places, [len(r.missed) for r in results], bottom=inside, color="C3", label="missed")
+    above.set_ylabel("crumbs")
+    above.legend(loc="upper left")
+    below.bar(places, [r.strokes for r in results], color="C0")
+    below.set_ylabel("strokes")
+    below.set_xlabel("layout")
+    return [_saved(figure, folder / "wipe.png")]
+
+
+def plot_drags(folder: Path, results: Sequence[DragResult]) -> list[Path]:
+    """The force asked for by what friction holds the box back with, N both; red: not held in the end."""
+    figure, (axes,) = _figure(1)
+    for held, color, label in ((True, "C2", "dragged and picked"), (False, "C3", "not held in the end")):
+        mine = [r for r in results if r.is_held == held]
+        weights = [GRAVITY * r.layout.mass * r.layout.friction for r in mine]
+        axes.scatter(weights, [r.force for r in mine], color=color, label=label)
+    axes.set_xlabel("friction of the box on the table, N")
+    axes.set_ylabel("greatest force asked for, N")
+    axes.legend()
+    return [_saved(figure, folder / "drag.png")]
+
+
+def plot_costs(folder: Path, runs: Sequence[Sequence[Cost]]) -> list[Path]:
+    """What a control tick costs, part by part."""
+    figure, (axes,) = _figure(1)
+    costs = middle(runs)
+    reached = [0.0] * len(costs)
+    for index, part in enumerate(PARTS):
+        shares = [cost.parts[part] for cost in costs]
+        color = "0.6" if part == "physics" else f"C{index % 10}"
+        axes.barh([cost.regime for cost in costs], shares, left=reached, label=part, color=color, edgecolor="white")
+        reached = [before + share for before, share in zip(reached, shares, strict=True)]
+    axes.set_xlabel("µs of CPU time a control tick of 2 ms")
+    axes.legend(ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return [_saved(figure, folder / "control.png")]
+
+
+PLOTS: Mapping[str, Callable[[Path, Sequence[Any]], list[Path]]] = {
+    "force": plot_forces,
+    "wipe": plot_wipes,
+    "drag": plot_drags,
+    "control": plot_costs,
+}
+"""By benchmark. Each returns the PNG files it made, and raises ImportError without matplotlib."""
+
+
+def _figure(rows: int, **options: Any) -> tuple[Any, Any]:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(rows, 1, figsize=(9, 4.5 * rows), layout="constrained", squeeze=False, **options)
+    return figure, axes[:, 0]
+
+
+def _saved(figure: Any, path: Path) -> Path:
+    from matplotlib import pyplot as plt
+
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+    return path

@@ -2,7 +2,8 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -14,6 +15,7 @@ from bt_tamp.options import RunOptions
 from bt_tamp.report.events import Event
 from bt_tamp.report.recorder import RunRecorder
 
+WHAT = "layouts"
 QUICK, GRAIN_QUICK = 4, 1
 """Layouts of a first look."""
 
@@ -128,6 +130,16 @@ def run_layout(layout: Layout, seed: int = 0) -> WipeResult:
         tuple(witness.failures),
         result.reason if missed else "",
     )
+
+
+def said(result: WipeResult) -> str:
+    """A layout in a line."""
+    return f"dustpan at {result.layout.side}: {result.inside} of {result.crumbs}"
+
+
+def records(results: Sequence[WipeResult]) -> list[dict[str, Any]]:
+    """For JSON."""
+    return [asdict(result) for result in results]
 
 
 def print_results(console: Console, results: Sequence[WipeResult]) -> None:

@@ -1,7 +1,5 @@
 """Closed-loop force along one direction: F = f_d + K_i ∫ (f_d − f) dt on the measured force f."""
 
-import numpy as np
-
 INTEGRAL_GAIN = 4.0
 """K_i in 1/s."""
 
@@ -57,6 +55,6 @@ class ForceLoop:
         step = INTEGRAL_GAIN * self._period * (self.wanted - measured)
         # What the loop may add is bounded, so that a lost contact or a stuck tool winds nothing up.
         authority = max(self.wanted, 2.0)
-        self._integral = float(np.clip(self._integral + step, -authority, authority))
+        self._integral = min(max(self._integral + step, -authority), authority)
         self.command = self.wanted + self._integral
         return self.command

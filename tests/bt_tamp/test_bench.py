@@ -1,15 +1,19 @@
 import json
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
 
-from bt_tamp.bench import force
+from bt_tamp.bench import control, force
 from bt_tamp.bench.checks import Check, at_least, at_most, write_json
+from bt_tamp.bench.control import PARTS, Cost
+from bt_tamp.bench.plots import PLOTS
 from bt_tamp.bench.scene import SPONGE, TABLE_TOP, Truth, believed, sponge_height, true_scene
 from bt_tamp.bench.slide import Case, SlideResult, run_slide
 from bt_tamp.bench.stopwatch import Stopwatch
 from bt_tamp.cli import main
+from bt_tamp.commands.bench import BENCHES
 
 NAN = float("nan")
 
@@ -164,3 +168,26 @@ def test_a_benchmark_must_be_named_and_known(capsys):
     assert main(["bench"]) == 2
     assert main(["bench", "speed"]) == 2
     assert "speed" in capsys.readouterr().err
+
+
+def test_costs_are_drawn_part_by_part(tmp_path):
+    pytest.importorskip("matplotlib")
+    costs = [Cost(regime, 3.0, dict.fromkeys(PARTS, 50.0), 40.0, 3.1) for regime in ("free", "wiping")]
+    made = PLOTS["control"](tmp_path, [costs])
+    assert [path.name for path in made] == ["control.png"]
+    assert made[0].stat().st_size > 5000
+
+
+def test_every_benchmark_has_what_the_command_asks_of_it():
+    for name in BENCHES:
+        bench = import_module(f"bt_tamp.bench.{name}")
+        parts = ("WHAT", "planned", "measure", "said", "print_results", "acceptance", "records")
+        assert all(hasattr(bench, part) for part in parts)
+        assert 0 < len(bench.planned(True)) < len(bench.planned(False))
+    assert PLOTS.keys() == BENCHES.keys()
+
+
+def test_of_three_runs_the_one_in_the_middle_is_told():
+    runs = [[Cost("wiping", 3.0, dict.fromkeys(PARTS, 50.0), 40.0, factor)] for factor in (3.5, 2.0, 3.1)]
+    assert [cost.real_time for cost in control.middle(runs)] == [3.1]
+    assert {check.figure: check.reached for check in control.acceptance(runs)}["wiping: real-time factor"]

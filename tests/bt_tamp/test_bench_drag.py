@@ -9,6 +9,7 @@ from rich.console import Console
 
 from bt_tamp.bench.boxes import BOX, COUNT, FRICTIONS, MASSES, Layout, layouts
 from bt_tamp.bench.drag import acceptance, print_results, run_layout
+from bt_tamp.bench.plots import plot_drags
 from planner.task.facts import place_of
 from scenarios.shapes import extents
 from sim.robot import WSG50, RobotModel
@@ -92,3 +93,10 @@ def test_a_layout_says_all_that_its_scene_needs():
     scenario = layout.scenario()
     assert scenario.table.X_WT.translation[1] > 0.5
     assert RobotModel().X_WG(scenario.robot.q0).translation[1] > 0.3, "the arm begins above the table"
+
+
+def test_boxes_are_drawn(outcome, tmp_path):
+    pytest.importorskip("matplotlib")
+    made = plot_drags(tmp_path, [outcome, replace(outcome, is_held=False)])
+    assert [path.name for path in made] == ["drag.png"]
+    assert made[0].stat().st_size > 5000

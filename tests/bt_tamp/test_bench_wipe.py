@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bt_tamp.bench.crumbs import COUNT, CUBES, GRAIN_SIZES, GRAINS, PAN, SIDES, SPONGE, cubes, grains
+from bt_tamp.bench.plots import plot_wipes
 from bt_tamp.bench.wipe import WipeResult, acceptance
 from bt_tamp.executive.preview import preview
 from bt_tamp.options import RunOptions
@@ -74,3 +75,10 @@ def test_shares_are_counted_over_all_crumbs_of_a_kind():
     assert checks[1].measured.startswith("90")
     assert checks[2].measured.startswith("3")
     assert np.isclose(result(1, 0, 2.0).factor, 3.0)
+
+
+def test_layouts_are_drawn(tmp_path):
+    pytest.importorskip("matplotlib")
+    made = plot_wipes(tmp_path, [result(5, 0, 2.0), result(7, 2, 2.0)])
+    assert [path.name for path in made] == ["wipe.png"]
+    assert made[0].stat().st_size > 5000
