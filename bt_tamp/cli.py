@@ -19,6 +19,7 @@ COMMANDS = {
     "plan": "plan a scene without acting: rounds, what failed, what was learned, the plan",
     "list": "list the scenes that ship with the package",
     "validate": "check a scene file",
+    "generate": "write a random scene file: solvable by construction, or unsolvable in a known way",
     "schema": "print the scene format as JSON Schema",
     "show": "draw a scene, and print the facts derived from it",
     "tree": "show the behaviour tree of a scene or of a run",

@@ -1,8 +1,8 @@
-"""Antipodal grasps of convex primitives with a parallel gripper, best first.
+"""Antipodal grasps with a parallel gripper, best first.
 
 A grasp closes the fingers along one axis of the shape, where its extent fits the stroke, and
 comes in along any direction square to that axis. Cylinders and spheres are treated as boxes
-turned about their axes of symmetry.
+turned about their axes of symmetry. Hulls and compounds are left to `antipodal`.
 """
 
 from collections.abc import Iterator
@@ -13,11 +13,9 @@ import numpy as np
 import pinocchio as pin
 from pinocchio import SE3
 
-from scenarios.shapes import Box, Cylinder, Shape, Sphere, extents
+from planner.antipodal import CLEARANCE, Grips, antipodal_grips
+from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, extents
 from sim.robot import Gripper
-
-CLEARANCE = 0.005
-"""Least gap in metres between each open finger and the object."""
 
 APPROACH_STEP = np.radians(15.0)
 DEPTHS = (0.075, 0.045)
@@ -72,7 +70,7 @@ def grasps(shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.
     offset = np.linalg.norm(np.cross(found.p, found.R[:, :, 2]), axis=1)
     level = 1.0 - np.abs(approach[:, 2])
     lever = np.abs(np.einsum("ij,ij->i", found.p, found.R[:, :, 2]))
-    score = -approach[:, 2] + 0.5 * level * (approach @ outward) - 4.0 * offset - 2.0 * lever
+    score = -approach[:, 2] + 0.5 * level * (approach @ outward) - 4.0 * offset - 2.0 * lever - found.cost
     score += JITTER * rng.random(len(offset))
     for index in np.argsort(-score, kind="stable"):
         yield Grasp.at(SE3(found.R[index], found.p[index]), float(found.width[index]))
@@ -91,17 +89,10 @@ def tool_grasps(
             yield grasp
 
 
-@dataclass(frozen=True)
-class _Candidates:
-    """Grasps as arrays: rotations R_OG (n,3,3), positions p_OG (n,3) and widths (n,)."""
-
-    R: np.ndarray
-    p: np.ndarray
-    width: np.ndarray
-
-
 @lru_cache(maxsize=256)
-def _candidates(shape: Shape, gripper: Gripper) -> _Candidates:
+def _candidates(shape: Shape, gripper: Gripper) -> Grips:
+    if isinstance(shape, Hull | Compound):
+        return antipodal_grips(shape, gripper)
     found = [
         (R_OF @ R_FG, R_OF @ p_FG, width)
         for R_OF in _symmetries(shape)
@@ -109,10 +100,10 @@ def _candidates(shape: Shape, gripper: Gripper) -> _Candidates:
     ]
     R = np.array([entry[0] for entry in found]).reshape(-1, 3, 3)
     p = np.array([entry[1] for entry in found]).reshape(-1, 3)
-    return _Candidates(R, p, np.array([entry[2] for entry in found]))
+    return Grips(R, p, np.array([entry[2] for entry in found]), np.zeros(len(found)))
 
 
-def _symmetries(shape: Shape) -> list[np.ndarray]:
+def _symmetries(shape: Box | Cylinder | Sphere) -> list[np.ndarray]:
     """Rotations (3,3) of the bounding box that the shape fills equally well."""
     about_z = [pin.rpy.rpyToMatrix(0.0, 0.0, a) for a in np.radians(np.arange(0.0, 90.0, 22.5))]
     match shape:

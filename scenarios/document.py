@@ -7,7 +7,7 @@ schema does, so that the key `on` stays text.
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -29,11 +29,12 @@ _CONSTANTS = {"": None, "~": None, "null": None, "true": True, "false": False, "
 
 @dataclass(frozen=True)
 class Document:
-    """Plain data as read from `file`; `lines` counts from 1."""
+    """Plain data as read from `file`; `lines` counts from 1. `folder` holds what the file refers to (None: nothing)."""
 
     file: str
     data: Any
     lines: dict[KeyPath, int]
+    folder: Path | None = None
 
     def line(self, path: KeyPath) -> int:
         """The line of a key path, or of its nearest parent."""
@@ -73,7 +74,7 @@ def read_document(path: Path, file: str) -> Document:
         raise SceneUnreadable(f"byte {error.start} is not UTF-8, expected a text file", file) from None
     if "\0" in text:
         raise SceneUnreadable("is binary, expected a text file", file)
-    return parse_document(text, file)
+    return replace(parse_document(text, file), folder=path.parent)
 
 
 def parse_document(text: str, file: str) -> Document:

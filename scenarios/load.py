@@ -8,6 +8,7 @@ import numpy as np
 
 from scenarios import checks, schema
 from scenarios.document import Document, read_document
+from scenarios.forms import forms
 from scenarios.goal import CLEAR_TABLE, GoalError, check_goal, clear_table, goal_text, parse_goal
 from scenarios.library import scenario_path
 from scenarios.noise import NoFreePose, PoseNoise, draw_poses
@@ -30,7 +31,9 @@ def build_scenario(document: Document, seed: int = 0) -> Scenario:
         raise ValueError(f"seed {seed}, expected 0 or above")
     file = schema.validate_document(document)
     _refuse(document, [*checks.name_problems(file), *checks.reference_problems(file)])
-    scenario = declared_scenario(file)
+    shapes, problems = forms(file, document.folder)
+    _refuse(document, problems)
+    scenario = declared_scenario(file, shapes)
     try:
         scenario = replace(scenario, goal=_goal(scenario))
     except GoalError as error:

@@ -9,11 +9,11 @@ from pinocchio import SE3
 from scenarios import schema
 from scenarios.names import TABLE
 from scenarios.scenario import Body, Fixture, Region, RobotPlacement, Scenario, Table
-from scenarios.shapes import Box, Cylinder, Shape, Sphere, extents
+from scenarios.shapes import Shape, reach
 
 
-def declared_scenario(file: schema.SceneFile) -> Scenario:
-    """The scenario at seed 0, its goal as written. Names in `on` and the goal must be known already."""
+def declared_scenario(file: schema.SceneFile, shapes: Mapping[str, Shape]) -> Scenario:
+    """The scenario at seed 0, its goal as written; `shapes` by name. Names in `on` and goal must be known."""
     table = Table(_triple(file.table.size), frame(file.table.pose), file.table.friction)
     regions = {name: _region(name, region) for name, region in file.regions.items()}
     heights = {TABLE: float(table.X_WT.translation[2]) + table.size[2] / 2}
@@ -25,8 +25,8 @@ def declared_scenario(file: schema.SceneFile) -> Scenario:
         robot=_robot(file.robot),
         table=table,
         regions=regions,
-        fixtures={name: _fixture(name, fixed, heights) for name, fixed in file.fixed.items()},
-        bodies={name: _body(name, thing, heights) for name, thing in things.items()},
+        fixtures={name: _fixture(name, fixed, shapes[name], heights) for name, fixed in file.fixed.items()},
+        bodies={name: _body(name, thing, shapes[name], heights) for name, thing in things.items()},
         goal=file.goal,
     )
 
@@ -37,7 +37,7 @@ def frame(pose: schema.Pose) -> SE3:
 
 
 def _frame_on(pose: schema.PoseOn, shape: Shape, heights: Mapping[str, float]) -> SE3:
-    z = heights[pose.on] + extents(shape)[2] / 2
+    z = heights[pose.on] + reach(shape, np.array([0.0, 0.0, -1.0]))
     return SE3(pin.rpy.rpyToMatrix(0.0, 0.0, np.radians(pose.yaw_deg)), np.array([*pose.xy, z]))
 
 
@@ -64,13 +64,11 @@ def _region(name: str, region: schema.Region) -> Region:
     )
 
 
-def _fixture(name: str, fixed: schema.Fixed, heights: Mapping[str, float]) -> Fixture:
-    shape = _shape(fixed.shape)
+def _fixture(name: str, fixed: schema.Fixed, shape: Shape, heights: Mapping[str, float]) -> Fixture:
     return Fixture(name, shape, _body_frame(fixed.pose, shape, heights), fixed.friction, _rgba(fixed.color))
 
 
-def _body(name: str, thing: schema.Thing | schema.Tool, heights: Mapping[str, float]) -> Body:
-    shape = _shape(thing.shape)
+def _body(name: str, thing: schema.Thing | schema.Tool, shape: Shape, heights: Mapping[str, float]) -> Body:
     is_tool = isinstance(thing, schema.Tool)
     return Body(
         name=name,
@@ -84,16 +82,6 @@ def _body(name: str, thing: schema.Thing | schema.Tool, heights: Mapping[str, fl
         contact_stiffness=thing.contact_stiffness if is_tool else None,
         contact_damping=thing.contact_damping if is_tool else None,
     )
-
-
-def _shape(solid: schema.Solid) -> Shape:
-    if solid.box is not None:
-        return Box(_triple(solid.box))
-    if solid.cylinder is not None:
-        return Cylinder(float(solid.cylinder.radius), float(solid.cylinder.height))
-    if solid.sphere is not None:
-        return Sphere(float(solid.sphere.radius))
-    raise ValueError("a shape without box, cylinder and sphere")
 
 
 def _triple(numbers: list[float]) -> tuple[float, float, float]:

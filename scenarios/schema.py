@@ -9,12 +9,13 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
-from pydantic_core import ErrorDetails, PydanticCustomError
+from pydantic_core import PydanticCustomError
 
 from scenarios.document import Document, KeyPath
 from scenarios.errors import SceneInvalid
 from scenarios.names import known
 from scenarios.robots import ROBOTS
+from scenarios.wording import message_of, path_of, shown
 
 VERSION = 1
 
@@ -102,21 +103,66 @@ class Ball(_Part):
     radius: Extent
 
 
-class Solid(_Part):
-    """One of box, cylinder and sphere. The origin is the geometric centre."""
+class Mesh(_Part):
+    """A convex mesh: the convex hull of points. Where these have their own origin makes no difference."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
+
+    vertices: Annotated[list[Position], Field(min_length=4, max_length=10_000)] | None = Field(
+        default=None, description="Points in metres; their convex hull, of at most 256 vertices, is taken."
+    )
+    file: str | None = Field(
+        default=None,
+        description="A Wavefront .obj file in the scene file's folder or below, in metres. It must be convex already.",
+    )
+
+    @model_validator(mode="after")
+    def _is_one(self) -> "Mesh":
+        if (self.vertices is None) == (self.file is None):
+            raise _problem("", "expected either vertices or a file")
+        return self
+
+
+class ConvexSolid(_Part):
+    """One of box, cylinder, sphere and mesh. The origin is the centre of volume."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
     box: Size | None = Field(default=None, description="Full extents along the object's x, y and z in metres.")
     cylinder: Round | None = Field(default=None, description="Radius and full height along the object's z in metres.")
     sphere: Ball | None = Field(default=None, description="Radius in metres.")
+    mesh: Mesh | None = Field(default=None, description="A convex polyhedron.")
 
     @model_validator(mode="after")
-    def _is_one(self) -> "Solid":
-        given = [key for key in type(self).model_fields if getattr(self, key) is not None]
+    def _is_one(self) -> "ConvexSolid":
+        fields = type(self).model_fields
+        given = [key for key in fields if getattr(self, key) is not None]
         if len(given) != 1:
-            raise _problem("", f"{len(given)} shapes are given, expected one of box, cylinder, sphere")
+            raise _problem("", f"{len(given)} shapes are given, expected one of {', '.join(fields)}")
         return self
+
+
+class PartPose(_Part):
+    """The frame of a part (its centre of volume) among the other parts."""
+
+    xyz: Position = Field(default=[0.0, 0.0, 0.0], description="Metres.")
+    rpy_deg: Angles = Field(default=[0.0, 0.0, 0.0], description="About the fixed axes x, then y, then z, in degrees.")
+
+
+class SolidPart(_Part):
+    """A convex part of a compound. All parts count in full: let them touch, but hardly overlap."""
+
+    shape: ConvexSolid
+    pose: PartPose = PartPose()
+
+
+class Solid(ConvexSolid):
+    """One of box, cylinder, sphere, mesh and compound. The origin is the centre of volume, which is what poses tell."""
+
+    compound: Annotated[list[SolidPart], Field(min_length=1, max_length=64)] | None = Field(
+        default=None,
+        description="One rigid body of convex parts (a mug, a bowl), posed among each other about any origin.",
+    )
 
 
 class Robot(_Part):
@@ -272,19 +318,19 @@ def validate_document(document: Document) -> SceneFile:
     """Hold plain data against the format. Raises SceneInvalid with the first problem and how many more there are."""
     data = document.data
     if not isinstance(data, dict):
-        raise SceneInvalid(f"expected a scene (a mapping), got {_shown(data)}", document.file, document.place(()))
+        raise SceneInvalid(f"expected a scene (a mapping), got {shown(data)}", document.file, document.place(()))
     if "version" not in data:
         message = f"missing key 'version', expected version: {VERSION}"
         raise SceneInvalid(message, document.file, document.place(()))
     if data["version"] != VERSION or isinstance(data["version"], bool):
-        message = f"version is {_shown(data['version'])}, expected {VERSION}"
+        message = f"version is {shown(data['version'])}, expected {VERSION}"
         raise SceneInvalid(message, document.file, document.place(("version",)))
     try:
         return SceneFile.model_validate(data)
     except ValidationError as error:
         problems = error.errors(include_url=False)
-        first = min(problems, key=lambda problem: document.line(_path(problem)))
-        raise invalid(document, _path(first), _message(first), len(problems) - 1) from None
+        first = min(problems, key=lambda problem: document.line(path_of(problem)))
+        raise invalid(document, path_of(first), message_of(first), len(problems) - 1) from None
 
 
 def invalid(document: Document, path: KeyPath, message: str, more: int = 0) -> SceneInvalid:
@@ -295,60 +341,3 @@ def invalid(document: Document, path: KeyPath, message: str, more: int = 0) -> S
 
 def _problem(key: str, message: str) -> PydanticCustomError:
     return PydanticCustomError("scene", "{message}", {"message": message, "key": key})
-
-
-def _path(error: ErrorDetails) -> KeyPath:
-    path = tuple(key for key in error["loc"] if not (isinstance(key, str) and key.startswith("<")))
-    if error["type"] == "missing":
-        return path[:-1]
-    key = error.get("ctx", {}).get("key", "")
-    return (*path, key) if key else path
-
-
-def _message(error: ErrorDetails) -> str:
-    kind, context = error["type"], error.get("ctx", {})
-    got = f"got {_shown(error['input'])}"
-    match kind:
-        case "scene":
-            return str(context["message"])
-        case "missing":
-            return f"missing key {error['loc'][-1]!r}, expected it here"
-        case "float_type" | "int_type":
-            return f"expected a number, {got}"
-        case "finite_number":
-            return f"expected a finite number, {got}"
-        case "greater_than_equal" | "greater_than" | "less_than_equal" | "less_than":
-            words = {"greater_than_equal": "of at least", "greater_than": "above", "less_than": "below"}
-            bound = context.get("ge", context.get("gt", context.get("le", context.get("lt"))))
-            return f"expected a number {words.get(kind, 'of at most')} {bound:g}, {got}"
-        case "too_short" | "too_long" if isinstance(error["input"], list):
-            count = context.get("min_length", context.get("max_length"))
-            return f"expected {count} numbers, got {len(error['input'])}"
-        case "too_long":
-            return f"expected at most {context['max_length']} entries, got {len(error['input'])}"
-        case "literal_error":
-            return f"expected {context['expected']}, {got}"
-        case "list_type":
-            return f"expected a list of numbers, {got}"
-        case "model_type" | "dict_type" | "model_attributes_type":
-            return f"expected a mapping, {got}"
-        case "string_type":
-            return f"expected text, {got}"
-        case "string_pattern_mismatch":
-            return f"expected text like #3355aa, {got}"
-    return f"{error['msg']}, {got}"
-
-
-def _shown(value: Any) -> str:
-    match value:
-        case None:
-            return "nothing"
-        case dict():
-            return "a mapping"
-        case list():
-            return "a list"
-        case bool():
-            return str(value).lower()
-        case str():
-            return repr(value if len(value) <= 40 else f"{value[:39]}…")
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -2,15 +2,16 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import coal
 import numpy as np
 from pinocchio import SE3
 
+from scenarios.hulls import Polyhedron
 from scenarios.regions import parts
 from scenarios.scenario import Body, Fixture, Region, Table
-from scenarios.shapes import Box, Cylinder, Shape, Sphere, bounding_radius
+from scenarios.shapes import Box, Convex, Cylinder, Hull, Sphere, bounding_radius, convex_parts, volume
 
 TOUCH = 1e-4
 """How deep in metres two things may overlap and still count as touching: hand-written poses are rounded."""
@@ -21,7 +22,20 @@ class Solid:
     """A named thing: its convex parts, each with its pose X_WP in the world."""
 
     name: str
-    parts: tuple[tuple[Shape, SE3], ...]
+    parts: tuple[tuple[Convex, SE3], ...]
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Centre of volume (3,) in W."""
+        weights = np.array([volume(shape) for shape, _ in self.parts])
+        return weights @ np.array([X_WP.translation for _, X_WP in self.parts]) / weights.sum()
+
+    @cached_property
+    def ball(self) -> tuple[np.ndarray, float]:
+        """Centre (3,) in W and radius of a sphere that holds the whole thing."""
+        centre = np.mean([X_WP.translation for _, X_WP in self.parts], axis=0)
+        reach = [np.linalg.norm(X_WP.translation - centre) + bounding_radius(shape) for shape, X_WP in self.parts]
+        return centre, float(max(reach))
 
     def moved(self, X_WW: SE3) -> "Solid":
         """The same thing after a rigid motion of the world."""
@@ -30,7 +44,8 @@ class Solid:
 
 def body_solid(body: Body | Fixture, X_WO: SE3 | None = None) -> Solid:
     """A body or fixture where it is declared, or at X_WO."""
-    return Solid(body.name, ((body.shape, body.X_WO if X_WO is None else X_WO),))
+    X_WO = body.X_WO if X_WO is None else X_WO
+    return Solid(body.name, tuple((shape, X_WO * X_OP) for shape, X_OP in convex_parts(body.shape)))
 
 
 def table_solid(table: Table) -> Solid:
@@ -58,14 +73,14 @@ def overlapping(solid: Solid, others: Iterable[Solid]) -> str | None:
     return next((other.name for other in others if overlap(solid, other)), None)
 
 
-def distance(first: tuple[Shape, SE3], second: tuple[Shape, SE3]) -> float:
+def distance(first: tuple[Convex, SE3], second: tuple[Convex, SE3]) -> float:
     """Distance in metres between two placed shapes, negative if they overlap; a lower bound when far apart."""
     (a, X_WA), (b, X_WB) = first, second
     gap = float(np.linalg.norm(X_WA.translation - X_WB.translation)) - bounding_radius(a) - bounding_radius(b)
     if gap > 0:
         return gap
     return coal.distance(
-        _geometry(a), _place(X_WA), _geometry(b), _place(X_WB), coal.DistanceRequest(), coal.DistanceResult()
+        geometry(a), _place(X_WA), geometry(b), _place(X_WB), coal.DistanceRequest(), coal.DistanceResult()
     )
 
 
@@ -74,7 +89,8 @@ def _place(X: SE3) -> coal.Transform3s:
 
 
 @lru_cache(maxsize=1024)
-def _geometry(shape: Shape) -> coal.ShapeBase:
+def geometry(shape: Convex) -> coal.ShapeBase:
+    """The shape as coal knows it, in the shape's own frame."""
     match shape:
         case Box((x, y, z)):
             return coal.Box(x, y, z)
@@ -82,3 +98,13 @@ def _geometry(shape: Shape) -> coal.ShapeBase:
             return coal.Cylinder(radius, height)
         case Sphere(radius):
             return coal.Sphere(radius)
+        case Hull():
+            return polytope(shape.solid, np.zeros(3))
+
+
+def polytope(solid: Polyhedron, offset: np.ndarray) -> coal.Convex:
+    """A polyhedron as coal knows it, moved by `offset` (3,) metres."""
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    points.extend(list(solid.vertices + offset))
+    triangles.extend([coal.Triangle(*map(int, corners)) for corners in solid.triangles])
+    return coal.Convex(points, triangles)

@@ -46,7 +46,7 @@ def _supports(solid: Solid, others: Iterable[Solid]) -> list[Solid]:
 
 
 def _is_above(solid: Solid, support: Solid) -> bool:
-    centre = solid.parts[0][1].translation
+    centre = solid.centre
     down = np.array([centre[0], centre[1], centre[2] - _PLUMB_LENGTH / 2])
     plumb = Solid("plumb", ((Box((_PLUMB_SIDE, _PLUMB_SIDE, _PLUMB_LENGTH)), SE3(np.eye(3), down)),))
     return overlap(plumb, support, 0.0)

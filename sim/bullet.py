@@ -8,9 +8,8 @@ import tempfile
 import weakref
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -20,10 +19,12 @@ from pinocchio import SE3
 
 from scenarios.regions import parts
 from scenarios.scenario import Scenario
-from scenarios.shapes import Box, Cylinder, Shape, Sphere
+from scenarios.shapes import Box, Shape
+from sim.bullet_shapes import add_collision_shape, add_visual_shape, principal_axes
+from sim.contact import NORMAL_FORCE, Contact
 from sim.plant import Command, GripCommand, Observation
 from sim.robot import GRAVITY, RobotModel
-from sim.scene import floor_height
+from sim.scene import floor_height, pedestal
 from sim.wrench import Wrench
 
 T = TypeVar("T")
@@ -51,7 +52,6 @@ turning on the spot, that of a round patch 9 mm across (two thirds of its radius
 what is held would swing. PyBullet's wrist sensor leaves these torques out, some 0.1 Nm: forces are felt rightly, so a
 load's mass is, but not where its centre lies."""
 
-PEDESTAL_SIZE = 0.24
 FLOOR_FRICTION = 0.8
 GEAR_STIFFNESS = 2e4
 """N/m between the fingers' slides. PyBullet's own gear constraint (JOINT_GEAR) would be felt by the wrist
@@ -59,35 +59,6 @@ sensor as if it were an outside force: 13 N with the fingers pressed against the
 
 GEAR_DAMPING = 40.0
 """N s/m: damps the 0.1 kg fingers well and is stable at 1 kHz."""
-
-
-_NORMAL_FORCE = 9
-
-
-@dataclass(frozen=True, slots=True)
-class Contact:
-    """A true contact point between two named things, as the engine tells it (`getContactPoints`)."""
-
-    first: str
-    second: str
-    point: tuple[Any, ...]
-
-    @property
-    def normal_force(self) -> float:
-        """N, pressing is positive."""
-        return self.point[_NORMAL_FORCE]
-
-    @property
-    def position(self) -> np.ndarray:
-        """(3,) in W, on the second."""
-        return np.array(self.point[6])
-
-    @property
-    def force(self) -> np.ndarray:
-        """(3,) in N on the first, in W, friction included."""
-        normal, across, along = self.point[7], self.point[11], self.point[13]
-        forces = self.point[_NORMAL_FORCE], self.point[10], self.point[12]
-        return np.array(forces) @ np.array((normal, across, along))
 
 
 @contextmanager
@@ -115,6 +86,7 @@ class BulletPlant:
         self._free = weakref.finalize(self, p.disconnect, self._client)
         self._free.atexit = False
         self._names: dict[int, str] = {}
+        self._turned: dict[str, tuple[tuple[float, ...], SE3]] = {}
         p.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         p.setPhysicsEngineParameter(
             fixedTimeStep=PHYSICS_STEP,
@@ -141,6 +113,10 @@ class BulletPlant:
         for name, body in self._bodies.items():
             position, quaternion = p.getBasePositionAndOrientation(body, physicsClientId=self._client)
             linear, angular = p.getBaseVelocity(body, physicsClientId=self._client)
+            if name in self._turned:
+                position, quaternion = p.multiplyTransforms(
+                    position, quaternion, (0.0, 0.0, 0.0), self._turned[name][0]
+                )
             poses[name] = position + quaternion
             velocities[name] = linear + angular
         return Observation(
@@ -193,7 +169,7 @@ class BulletPlant:
         return [
             Contact(self._name(point[1], point[3]), self._name(point[2], point[4]), point)
             for point in p.getContactPoints(physicsClientId=self._client)
-            if point[_NORMAL_FORCE] > 0.0
+            if point[NORMAL_FORCE] > 0.0
         ]
 
     def pressed(self, first: str, second: str) -> float:
@@ -205,7 +181,7 @@ class BulletPlant:
             if len(found) != 1:
                 raise ValueError(f"{len(found)} bodies are called {name!r}, expected one")
             bodies += found
-        return sum(point[9] for point in p.getContactPoints(*bodies, physicsClientId=self._client))
+        return sum(point[NORMAL_FORCE] for point in p.getContactPoints(*bodies, physicsClientId=self._client))
 
     def push(self, force: np.ndarray, link: str | None = None) -> None:
         """Apply a force (3,) in N, in W, during the next step: at the tool centre, or at the centre of mass of
@@ -216,7 +192,8 @@ class BulletPlant:
 
     def put(self, name: str, X_WO: SE3) -> None:
         """Put a body elsewhere, at rest: what a person's hand does, for disturbances. The executive never calls it."""
-        pose = pin.SE3ToXYZQUAT(X_WO)
+        turned = self._turned.get(name)
+        pose = pin.SE3ToXYZQUAT(X_WO if turned is None else X_WO * turned[1])
         p.resetBasePositionAndOrientation(
             self._bodies[name], list(pose[:3]), list(pose[3:]), physicsClientId=self._client
         )
@@ -261,40 +238,17 @@ class BulletPlant:
             return self._link_names[link]
         return self._names[body]
 
-    def _collision_shape(self, shape: Shape) -> int:
-        match shape:
-            case Box(size):
-                return p.createCollisionShape(
-                    p.GEOM_BOX, halfExtents=[s / 2 for s in size], physicsClientId=self._client
-                )
-            case Cylinder(radius, height):
-                return p.createCollisionShape(
-                    p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=self._client
-                )
-            case Sphere(radius):
-                return p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=self._client)
-
-    def _visual_shape(self, shape: Shape, color: tuple[float, float, float, float]) -> int:
-        match shape:
-            case Box(size):
-                return p.createVisualShape(
-                    p.GEOM_BOX, halfExtents=[s / 2 for s in size], rgbaColor=color, physicsClientId=self._client
-                )
-            case Cylinder(radius, height):
-                return p.createVisualShape(
-                    p.GEOM_CYLINDER, radius=radius, length=height, rgbaColor=color, physicsClientId=self._client
-                )
-            case Sphere(radius):
-                return p.createVisualShape(p.GEOM_SPHERE, radius=radius, rgbaColor=color, physicsClientId=self._client)
-
     def _add(
         self, name: str, shape: Shape, X_WO: SE3, friction: float, mass: float, color: tuple[float, float, float, float]
     ) -> int:
-        pose = pin.SE3ToXYZQUAT(X_WO)
+        axes = principal_axes(shape)
+        pose = pin.SE3ToXYZQUAT(X_WO if axes is None else X_WO * axes[0])
+        X_IO = [0.0] * 6 + [1.0] if axes is None else pin.SE3ToXYZQUAT(axes[0].inverse()).tolist()
+        frame = {"visualFramePosition": X_IO[:3], "visualFrameOrientation": X_IO[3:]}
         body = p.createMultiBody(
             mass,
-            self._collision_shape(shape),
-            self._visual_shape(shape, color),
+            add_collision_shape(shape, self._client),
+            add_visual_shape(shape, self._client, rgbaColor=color, **frame),
             list(pose[:3]),
             list(pose[3:]),
             # In maximal coordinates, which cost less, a pushed cube drifts aside by a tenth of its way and a pressed
@@ -302,6 +256,15 @@ class BulletPlant:
             useMaximalCoordinates=False,
             physicsClientId=self._client,
         )
+        if axes is not None:
+            # Moments without the mass make a rigid body one of no mass.
+            p.changeDynamics(
+                body,
+                -1,
+                mass=mass,
+                localInertiaDiagonal=[mass * moment for moment in axes[1]],
+                physicsClientId=self._client,
+            )
         p.changeDynamics(
             body,
             -1,
@@ -326,12 +289,9 @@ class BulletPlant:
             0.0,
             (0.8, 0.8, 0.8, 1.0),
         )
-        base = scenario.robot.X_WB.translation
-        height = float(base[2]) - floor
-        if height > 0.0:
-            centre = np.array([base[0], base[1], floor + height / 2])
-            pedestal = Box((PEDESTAL_SIZE, PEDESTAL_SIZE, height))
-            self._add("pedestal", pedestal, SE3(np.eye(3), centre), FLOOR_FRICTION, 0.0, (0.4, 0.4, 0.4, 1.0))
+        block = pedestal(scenario)
+        if block is not None:
+            self._add("pedestal", *block, FLOOR_FRICTION, 0.0, (0.4, 0.4, 0.4, 1.0))
         table = scenario.table
         self._add("table", table.shape, table.X_WT, table.friction, 0.0, (0.75, 0.6, 0.45, 1.0))
         for region in scenario.regions.values():
@@ -343,6 +303,10 @@ class BulletPlant:
 
     def _add_body(self, name: str) -> int:
         body = self.scenario.bodies[name]
+        axes = principal_axes(body.shape)
+        if axes is not None:
+            X_OI, _ = axes
+            self._turned[name] = tuple(pin.SE3ToXYZQUAT(X_OI.inverse())[3:].tolist()), X_OI
         identity = self._add(name, body.shape, body.X_WO, body.friction, body.mass, body.color)
         if body.contact_stiffness is not None and body.contact_damping is not None:
             p.changeDynamics(

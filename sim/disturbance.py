@@ -14,7 +14,8 @@ import numpy as np
 import pinocchio as pin
 from pinocchio import SE3
 
-from sim.bullet import BulletPlant, Contact
+from sim.bullet import BulletPlant
+from sim.contact import Contact
 from sim.plant import Command, Observation
 from sim.wrench import Wrench
 

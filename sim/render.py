@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image, ImageChops, ImageFilter
 
 from scenarios.scenario import Scenario
-from scenarios.shapes import Box, bounding_radius, extents
+from scenarios.shapes import Box, bounding_radius, extents, middle
 from sim.render_camera import VIEW_FROM, Camera, Window
 from sim.render_egl import egl_is_faster
 from sim.render_stage import LIGHT_FROM, LINK_REACH, ArmOnStage, Engine, Stage, add_room
@@ -138,7 +138,7 @@ def overview(scenario: Scenario, width: int, height: int, foot: float = 0.0) -> 
     solids += [(fixture.shape, fixture.X_WO) for fixture in scenario.fixtures.values()]
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     for shape, X_WO in solids:
-        points += [X_WO.act(corner) for corner in corners * extents(shape)]
+        points += [X_WO.act(corner) for corner in corners * extents(shape) + middle(shape)]
     return Camera.seeing(np.array(points), base.rotation @ VIEW_FROM, width, height, foot)
 
 

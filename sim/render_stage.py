@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -14,8 +14,9 @@ from pinocchio import SE3
 
 from scenarios.regions import parts
 from scenarios.scenario import Scenario
-from scenarios.shapes import Box, Cylinder, Shape, Sphere
+from scenarios.shapes import Box, Shape
 from sim.bullet import resolved_urdf
+from sim.bullet_shapes import add_visual_shape
 from sim.render_camera import Camera, Window, distances
 from sim.render_egl import load_egl
 from sim.robot import RobotModel
@@ -63,14 +64,7 @@ class Stage:
 
     def add(self, shape: Shape, X_WO: SE3, color: Color) -> int:
         """Put a shape at X_WO; its number for `put`."""
-        paint: dict[str, Any] = {"rgbaColor": color, "specularColor": (0.0, 0.0, 0.0), "physicsClientId": self.client}
-        match shape:
-            case Box(size):
-                visual = p.createVisualShape(p.GEOM_BOX, halfExtents=[s / 2 for s in size], **paint)
-            case Cylinder(radius, height):
-                visual = p.createVisualShape(p.GEOM_CYLINDER, radius=radius, length=height, **paint)
-            case Sphere(radius):
-                visual = p.createVisualShape(p.GEOM_SPHERE, radius=radius, **paint)
+        visual = add_visual_shape(shape, self.client, rgbaColor=color, specularColor=(0.0, 0.0, 0.0))
         pose = pin.SE3ToXYZQUAT(X_WO)
         return p.createMultiBody(0.0, -1, visual, list(pose[:3]), list(pose[3:]), physicsClientId=self.client)
 

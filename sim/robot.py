@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from pinocchio import SE3
 
-from scenarios.shapes import Box, Cylinder, Shape, Sphere
+from scenarios.shapes import Box, Convex, Cylinder, Sphere
 
 GRAVITY = 9.81
 """Magnitude of gravity in m/s², along −z of W, in the models and in the simulated world."""
@@ -58,7 +58,7 @@ class LinkShape:
     """A solid part of the robot: shape, and its pose X_LS in the frame of `link`."""
 
     link: str
-    shape: Shape
+    shape: Convex
     X_LS: SE3
 
 
@@ -177,7 +177,7 @@ def _origin(element: ET.Element) -> SE3:
     return SE3(pin.rpy.rpyToMatrix(rpy), _floats(origin.attrib.get("xyz", "0 0 0")))
 
 
-def _shape(element: ET.Element) -> Shape:
+def _shape(element: ET.Element) -> Convex:
     for geometry in element.iter("geometry"):
         for shape in geometry:
             match shape.tag:

@@ -12,7 +12,7 @@ import numpy as np
 from pinocchio import SE3
 
 from scenarios.scenario import Scenario
-from scenarios.shapes import Box, Shape, extents
+from scenarios.shapes import Box, Shape, reach
 
 PEDESTAL_SIZE = 0.24
 """Side in metres of the square block under a robot whose base is above the floor."""
@@ -87,10 +87,15 @@ def pedestal(scenario: Scenario) -> tuple[Box, SE3] | None:
     return Box((PEDESTAL_SIZE, PEDESTAL_SIZE, height)), SE3(np.eye(3), centre)
 
 
-def half_height(shape: Shape, R_WO: np.ndarray) -> float:
-    """Half the vertical extent in metres of a shape's bounding box turned by R_WO."""
-    return float(np.abs(R_WO[2]) @ extents(shape)) / 2
+def height_above(shape: Shape, R_WO: np.ndarray) -> float:
+    """How far in metres a shape turned by R_WO reaches above its origin."""
+    return reach(shape, R_WO[2])
+
+
+def depth_below(shape: Shape, R_WO: np.ndarray) -> float:
+    """How far in metres a shape turned by R_WO reaches below its origin."""
+    return reach(shape, -R_WO[2])
 
 
 def _bottom(shape: Shape, X_WO: SE3) -> float:
-    return float(X_WO.translation[2]) - half_height(shape, X_WO.rotation)
+    return float(X_WO.translation[2]) - depth_below(shape, X_WO.rotation)

@@ -11,7 +11,7 @@ from planner.failure import MotionFailure, RefinementFailure
 from planner.refinement import Budget, Hints, Phase, Refinement
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Body, Table
-from scenarios.shapes import extents
+from scenarios.shapes import reach
 from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
 from skills.pick import Pick
@@ -20,6 +20,7 @@ from skills.skill import Toolkit, Unfit, beyond_reach, refine_by_sampling
 from skills.towing import (
     EDGE_MARGIN,
     Tips,
+    fixed_in_way,
     is_on_top,
     margin_inside,
     press_pose,
@@ -85,7 +86,7 @@ def edge_normal(table: Table, edge: int) -> np.ndarray:
 def standing_out(body: Body, X_WO: SE3, table: Table, edge: int) -> float:
     """Metres by which the object at X_WO stands out beyond an edge; negative while it doesn't."""
     normal = edge_normal(table, edge)
-    half = float(np.abs(normal @ X_WO.rotation) @ extents(body.shape)) / 2
+    half = reach(body.shape, X_WO.rotation.T @ normal)
     inside = table.size[edge // 2] / 2 - float((X_WO.translation - table.X_WT.translation) @ normal)
     return half - inside
 
@@ -184,7 +185,7 @@ class _Search:
     second_best: Refinement | None = None
     _failures: list[int] = field(default_factory=lambda: [0, 0, 0, 0])
     _grasps: dict[tuple[End, frozenset[str]], RefinementFailure | None] = field(default_factory=dict)
-    _ungraspable: set[End] = field(default_factory=set)
+    _hopeless: set[End] = field(default_factory=set)
 
     def pulls(self, body: Body, pressing: Pressing) -> Iterator[Pull]:
         """Samples, the edges by way and by how often they have failed."""
@@ -198,7 +199,7 @@ class _Search:
             end = left[edge].pop()[1]
             for tips in self._fitting(body, end):
                 yield Pull(end, tips, pressing)
-                if end in self._ungraspable:
+                if end in self._hopeless:
                     break
             self._failures[edge] += 1
 
@@ -209,14 +210,18 @@ class _Search:
         X_WO_end = pull.end.pose(body, X_WO, table)
         if not self._fits(body, X_WO, X_WO_end, pull.tips):
             return Unfit("the fingertips would not stay on it, above the table")
+        wall = fixed_in_way(world.scenario, body, X_WO, X_WO_end)
+        if wall is not None:
+            self._hopeless.add(pull.end)
+            return Unfit(f"{wall} stands in its way")
         missing = self._missing_grasp(pull, X_WO_end, world)
         if missing is not None and not missing.culprit_sets:
-            self._ungraspable.add(pull.end)
+            self._hopeless.add(pull.end)
             return MotionFailure(f"it could not be grasped there: {missing.reason}")
         phases = tow(self.kit, self.action, world, X_WO_end, pull.tips, pull.pressing)
         if missing is None or not isinstance(phases, tuple):
             return phases
-        self._ungraspable.add(pull.end)
+        self._hopeless.add(pull.end)
         if self.second_best is None:
             self.second_best = Refinement(self.action, pull, phases)
         return MotionFailure(f"something would be in the way of a grasp there: {missing.reason}")

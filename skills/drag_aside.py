@@ -11,7 +11,7 @@ from planner.failure import MotionFailure, RefinementFailure
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Body
-from scenarios.shapes import extents
+from scenarios.shapes import bounds
 from sim.scene import Held, SceneState
 from skills.context import ActionRun, SkillContext
 from skills.pressing import Pressing, in_order
@@ -147,7 +147,8 @@ def _room(name: str, X_WO: SE3, scene: SceneState) -> float:
     bodies = scene.scenario.bodies
 
     def radius(of: str) -> float:
-        return float(np.hypot(*np.sort(extents(bodies[of].shape))[1:])) / 2
+        lower, upper = bounds(bodies[of].shape)
+        return float(np.hypot(*np.sort(np.maximum(-lower, upper))[1:]))
 
     gaps = [
         float(np.hypot(*(X.translation - X_WO.translation)[:2])) - radius(other) - radius(name)

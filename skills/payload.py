@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scenarios.shapes import Box, Cylinder, Shape, Sphere
+from scenarios.shapes import inertia
 from sim.scene import SceneState
 
 
@@ -16,15 +16,3 @@ def load_of(scene: SceneState, name: str) -> tuple[float, np.ndarray, np.ndarray
     body = scene.scenario.bodies[name]
     R_GO = scene.held.X_GO.rotation
     return body.mass, np.array(scene.held.X_GO.translation), R_GO @ inertia(body.shape, body.mass) @ R_GO.T
-
-
-def inertia(shape: Shape, mass: float) -> np.ndarray:
-    """Rotational inertia (3,3) in kg m² of a homogeneous body about its centre, in its own axes."""
-    match shape:
-        case Box((x, y, z)):
-            return mass / 12 * np.diag([y * y + z * z, x * x + z * z, x * x + y * y])
-        case Cylinder(r, h):
-            side = mass * (3 * r * r + h * h) / 12
-            return np.diag([side, side, mass * r * r / 2])
-        case Sphere(r):
-            return 0.4 * mass * r * r * np.eye(3)

@@ -9,6 +9,7 @@ from py_trees.behaviour import Behaviour
 from planner.failure import Blocked, MotionFailure, RefinementFailure
 from planner.grasps import Grasp, grasps, open_width, tool_grasps
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
+from planner.support import supports
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Body
 from sim.robot import GRAVITY
@@ -119,7 +120,7 @@ class Pick:
             return unfit
 
         grasped = replace(scene, opening=grasp.width, held=Held(name, grasp.X_OG.inverse()))
-        resting = touching | pairs(name, place)
+        resting = touching | pairs(name, supports(scene, name) | {place})
 
         def lines(legs: Legs) -> tuple[Line, ...]:
             into, out = legs

@@ -8,6 +8,7 @@ from py_trees.behaviour import Behaviour
 
 from planner.failure import MotionFailure, RefinementFailure
 from planner.grasps import open_width
+from planner.packing import clear_first, standing_about
 from planner.placements import Placement, Surface, placements, surface_of, top_of
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
 from planner.task.facts import place_of
@@ -83,13 +84,14 @@ class Place:
         def attempt(placement: Placement, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
             return self._attempt(action, placement, world)
 
-        shape = scene.scenario.bodies[name].shape
-        too_large = wider_than(place_named(scene.scenario, goal), shape)
+        body = scene.scenario.bodies[name]
+        too_large = wider_than(place_named(scene.scenario, goal), body.shape)
         if too_large is not None:
             return RefinementFailure(action, f"{name} {too_large} {goal}", proof="anywhere")
         holding = (self._kit.robot.X_WG(scene.q), scene.held.X_GO)
-        ways = [placements(shape, holding, surface, rng) for surface in surfaces(scene, goal)]
-        samples = (sample for turn in zip_longest(*ways) for sample in turn if sample is not None)
+        ways = [placements(body.shape, holding, surface, rng) for surface in surfaces(scene, goal)]
+        drawn = (sample for turn in zip_longest(*ways) for sample in turn if sample is not None)
+        samples = clear_first(drawn, body, standing_about(scene))
         nothing = f"{name}, as it is held, fits nowhere in {goal}"
         return refine_by_sampling(action, scene, samples, attempt, budget, hints, nothing)
 

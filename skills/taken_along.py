@@ -184,11 +184,11 @@ class TakenAlong(Behaviour):
         return Status.SUCCESS
 
     def _tip(self) -> np.ndarray:
-        """Where the fingertips are on the object, along its level axes (2,), in metres."""
+        """Where the fingertips are on the object (3,), in its frame, whatever their height; in metres."""
         context = self._context
         X_WO = context.scene.poses[self._run.action.args[0]]
-        up = int(np.argmax(np.abs(X_WO.rotation[2])))
-        return np.delete(X_WO.actInv(context.robot.X_WG(context.observation.q).translation), up)
+        up_O, tip_O = X_WO.rotation[2], X_WO.actInv(context.robot.X_WG(context.observation.q).translation)
+        return tip_O - float(up_O @ tip_O) * up_O
 
     def _slipped(self, reason: str) -> Status:
         action, refinement = self._run.action, self._run.refinement

@@ -12,11 +12,13 @@ from pinocchio import SE3
 
 from planner.failure import Blocked, MotionFailure, RefinementFailure
 from planner.refinement import Phase, pairs
+from planner.stability import room_about, tops
 from planner.task.symbols import GroundAction
-from scenarios.scenario import Body, Table
-from scenarios.shapes import Cylinder, Sphere, extents
+from scenarios.scenario import Body, Scenario, Table
+from scenarios.shapes import Compound, Cylinder, Hull, Sphere, extents, middle
+from scenarios.solids import body_solid, overlap, region_solid
 from sim.robot import GRAVITY, Gripper
-from sim.scene import Held, SceneState, half_height
+from sim.scene import Held, SceneState, height_above
 from skills.pressing import Pressing
 from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way
 from skills.waypoints import raised, shifted
@@ -52,6 +54,12 @@ EDGE_MARGIN = 0.02
 
 TIP_MARGIN = 0.004
 """Metres that the fingertips stay inside the rim of the object's top."""
+
+LOOK = 0.02
+"""Metres between the poses at which an object's way is looked at before a motion is sought."""
+
+DEPTH = 0.002
+"""Metres by which what is believed of poses may have things overlap that don't."""
 
 LEVEL = 0.99
 """Cosine of the angle off level up to which an object's top can be pressed on."""
@@ -128,7 +136,7 @@ def press_pose(body: Body, X_WO: SE3, way: np.ndarray, tips: Tips) -> SE3:
     """Pose X_WG of the hand with the fingertips on the object at X_WO that shall go along `way` (3,)."""
     along = way / max(float(np.linalg.norm(way)), 1e-9)
     left = np.array([-along[1], along[0], 0.0])
-    top = np.array([0.0, 0.0, half_height(body.shape, X_WO.rotation)])
+    top = np.array([0.0, 0.0, height_above(body.shape, X_WO.rotation)])
     p_WG = X_WO.translation + top + along * tips.ahead + left * tips.aside
     return SE3(pin.rpy.rpyToMatrix(np.pi, 0.0, tips.yaw), p_WG)
 
@@ -146,12 +154,18 @@ def has_level_top(body: Body, X_WO: SE3) -> bool:
             return False
         case Cylinder():
             return abs(X_WO.rotation[2, 2]) > LEVEL
+        case Hull() | Compound():
+            return bool(tops(body.shape, X_WO.rotation[2], LEVEL))
         case _:
             return float(np.abs(X_WO.rotation[2]).max()) > LEVEL
 
 
 def is_on_top(body: Body, X_WO: SE3, points: list[np.ndarray]) -> bool:
     """Do points of W lie over the object's top, inside its rim?"""
+    if isinstance(body.shape, Hull | Compound):
+        points_O = [X_WO.actInv(point) for point in points]
+        faces = tops(body.shape, X_WO.rotation[2], LEVEL)
+        return any(min(room_about(*face, point) for point in points_O) >= TIP_MARGIN for face in faces)
     up = int(np.argmax(np.abs(X_WO.rotation[2])))
     half = np.delete(extents(body.shape), up) / 2 - TIP_MARGIN
     offsets = np.array([np.delete(X_WO.actInv(point), up) for point in points])
@@ -166,10 +180,25 @@ def margin_inside(table: Table, p_W: np.ndarray) -> float:
     return float((np.array(table.size[:2]) / 2 - p_T).min())
 
 
+def fixed_in_way(scenario: Scenario, body: Body, X_WO: SE3, X_WO_end: SE3) -> str | None:
+    """The name of a fixture or region that the object would run into on its straight way, or None."""
+    fixed = [body_solid(fixture) for fixture in scenario.fixtures.values()]
+    fixed += [region_solid(region) for region in scenario.regions.values()]
+    way = X_WO_end.translation - X_WO.translation
+    steps = max(1, int(np.ceil(float(np.linalg.norm(way)) / LOOK)))
+    # Beginning with the end, which is where most ways are blocked.
+    for step in range(steps, 0, -1):
+        there = body_solid(body, shifted(X_WO, way * step / steps))
+        hit = next((other.name for other in fixed if overlap(there, other, DEPTH)), None)
+        if hit is not None:
+            return hit
+    return None
+
+
 def footprint(body: Body, X_WO: SE3) -> list[np.ndarray]:
     """The corners (3,) of the object's bounding box in W."""
-    half = extents(body.shape) / 2
-    return [X_WO.act(half * (2.0 * np.array(signs) - 1.0)) for signs in np.ndindex(2, 2, 2)]
+    half, centre = extents(body.shape) / 2, middle(body.shape)
+    return [X_WO.act(centre + half * (2.0 * np.array(signs) - 1.0)) for signs in np.ndindex(2, 2, 2)]
 
 
 def tow(

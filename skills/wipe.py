@@ -18,7 +18,7 @@ from planner.refinement import Budget, Hints, Pair, Phase, Refinement, pairs
 from planner.task.facts import place_of
 from planner.task.symbols import GroundAction
 from scenarios.regions import interior
-from scenarios.shapes import Box, Shape, extents
+from scenarios.shapes import Box, Compound, Hull, Shape, bounding_radius, extents, middle, reach
 from sim.scene import Held, SceneState
 from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
@@ -123,7 +123,7 @@ class Wipe:
         swept = {crumb, *(name for name, is_taken in zip(place.crumbs.names, mask, strict=True) if is_taken)}
         lower, upper = interior(scene.scenario.regions[pan])
         for name, spot in zip(sorted(swept), _spots(lower, upper, len(swept)), strict=True):
-            spot[2] = lower[2] + float(extents(scene.scenario.bodies[name].shape)[2]) / 2
+            spot[2] = lower[2] + reach(scene.scenario.bodies[name].shape, np.array([0.0, 0.0, -1.0]))
             after = after.moved(name, SE3(np.eye(3), scene.scenario.regions[pan].X_WR.act(spot)))
         return after
 
@@ -243,12 +243,14 @@ class Wipe:
 @dataclass(frozen=True)
 class _Broadside:
     """How a held tool lies to its course: unit columns in O of its front (along its longest level axis), the course
-    and up; its width and depth in metres."""
+    and up; its width and depth in metres, and how far it reaches below its origin. p_OM (3,): where the middle of its
+    bounding box lies from the origin."""
 
     basis_O: np.ndarray
     width: float
     depth: float
-    half_height: float
+    below: float
+    p_OM: np.ndarray
 
     @staticmethod
     def of(shape: Shape, held: Held) -> "_Broadside":
@@ -262,7 +264,7 @@ class _Broadside:
         z_O = -np.sign(approach_O[down]) * np.eye(3)[down]
         y_O = np.eye(3)[longest]
         basis_O = np.column_stack([np.cross(y_O, z_O), y_O, z_O])
-        return _Broadside(basis_O, float(size[longest]), float(size[other]), float(size[down]) / 2)
+        return _Broadside(basis_O, float(size[longest]), float(size[other]), reach(shape, -z_O), middle(shape))
 
     def turned(self, heading: float, flipped: bool) -> np.ndarray:
         """Rotation R_WO of the tool broadside to a heading."""
@@ -274,12 +276,13 @@ class _Broadside:
 def _hand_poses(scene: SceneState, held: Held, stroke: Stroke, flipped: bool) -> list[SE3]:
     """Poses X_WG of the hand along the stroke, the sponge standing on the table."""
     grip = _Broadside.of(scene.scenario.bodies[held.name].shape, held)
-    height = top_of(scene.scenario.table) + grip.half_height
+    height = top_of(scene.scenario.table) + grip.below
     X_OG = held.X_GO.inverse()
     poses = []
     for front, heading in stroke.course():
         centre = front - along(heading) * grip.depth / 2
-        poses.append(SE3(grip.turned(heading, flipped), np.array([*centre, height])) * X_OG)
+        R_WO = grip.turned(heading, flipped)
+        poses.append(SE3(R_WO, np.array([*(centre - (R_WO @ grip.p_OM)[:2]), height])) * X_OG)
     return poses
 
 
@@ -307,6 +310,8 @@ def _radius(shape: Shape) -> float:
     """Metres of the circle about a crumb's footprint, whichever side it lies on."""
     if isinstance(shape, Box):
         return float(np.linalg.norm(np.sort(shape.size)[1:])) / 2
+    if isinstance(shape, Hull | Compound):
+        return bounding_radius(shape)
     return float(extents(shape).max()) / 2
 
 

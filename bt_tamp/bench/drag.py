@@ -18,7 +18,7 @@ from bt_tamp.report.signals import Reference
 from scenarios.scenario import Table
 from scenarios.shapes import Box
 from sim.plant import Observation
-from sim.scene import half_height
+from sim.scene import depth_below
 
 WHAT = "boxes"
 QUICK = 6
@@ -132,7 +132,7 @@ def _height(layout: Layout, observation: Observation | None) -> float:
     if observation is None:
         return 0.0
     X_WO = observation.poses[BOX]
-    return float(X_WO.translation[2]) - half_height(Box(layout.size), X_WO.rotation) - TOP
+    return float(X_WO.translation[2]) - depth_below(Box(layout.size), X_WO.rotation) - TOP
 
 
 def _edge(table: Table, p_WO: np.ndarray | None) -> str:

@@ -11,13 +11,13 @@ from bt_tamp.bench.stopwatch import Stopwatch
 from planner.motion.motion_planner import MotionPlanner
 from planner.motion.timing import time_line
 from planner.motion.trajectory import Trajectory
+from scenarios.shapes import inertia
 from sim.bullet import BulletPlant
 from sim.disturbance import DisturbedPlant, Fault
 from sim.plant import Command, GripCommand, Observation
 from sim.robot import RobotModel
 from skills.control.controller import ArmController
 from skills.control.reference import Reference
-from skills.payload import inertia
 
 CONTROL_EVERY = 2
 CLEARANCE = 0.02

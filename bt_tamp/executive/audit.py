@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bt_tamp.report.result import UnintendedContact
-from sim.bullet import Contact
+from sim.contact import Contact
 from sim.robot import RobotModel
 from skills.context import SkillContext
 

@@ -4,7 +4,7 @@ import numpy as np
 from pinocchio import SE3
 
 from scenarios.scenario import Scenario
-from scenarios.shapes import Box, Cylinder, Shape, Sphere
+from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, outline
 from sim.plant import Observation
 from sim.robot import RobotModel
 from sim.scene import Held, SceneState
@@ -56,7 +56,11 @@ class Belief:
 
 
 def distance_to(shape: Shape, p_O: np.ndarray) -> float:
-    """Distance in metres from a point p_O (3,), in the shape's frame, to the shape; 0 inside."""
+    """Distance in metres from a point p_O (3,), in the shape's frame, to the shape; 0 inside.
+
+    What lies in a compound's hollow is inside: fingers that hold a mug from without have nothing between their middles.
+    Beyond an edge of a hull it is the distance to the nearer face's plane, which is less.
+    """
     match shape:
         case Box(size):
             return float(np.linalg.norm(np.maximum(np.abs(p_O) - np.array(size) / 2, 0.0)))
@@ -65,3 +69,5 @@ def distance_to(shape: Shape, p_O: np.ndarray) -> float:
             return float(np.hypot(radial, max(abs(float(p_O[2])) - height / 2, 0.0)))
         case Sphere(radius):
             return max(float(np.linalg.norm(p_O)) - radius, 0.0)
+        case Hull() | Compound():
+            return max(outline(shape).outside(p_O), 0.0)

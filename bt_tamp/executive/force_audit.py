@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bt_tamp.report.result import PressedMotion
-from sim.bullet import Contact
+from sim.contact import Contact
 from sim.robot import RobotModel
 from skills.context import SkillContext
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 from pinocchio import SE3
 
 from scenarios.scenario import Body, Fixture, Region, RobotPlacement, Scenario, Table
-from scenarios.shapes import Box, Cylinder, Shape, Sphere
+from scenarios.shapes import Box, Compound, Convex, Cylinder, Hull, Part, Shape, Sphere
 
 FORMAT = 1
 
@@ -67,6 +67,10 @@ def _plain_value(value: Any) -> Any:
             return {"cylinder": {"radius": radius, "height": height}}
         case Sphere(radius):
             return {"sphere": {"radius": radius}}
+        case Hull(vertices):
+            return {"mesh": {"vertices": [list(p) for p in vertices]}}
+        case Compound(parts):
+            return {"compound": [{"shape": _plain_value(p.shape), "pose": [*p.position, *p.quaternion]} for p in parts]}
     return value
 
 
@@ -86,10 +90,24 @@ def _revived_value(name: str, value: Any) -> Any:
 
 def _shape(data: Mapping[str, Any]) -> Shape:
     match dict(data):
+        case {"compound": list(parts)}:
+            return Compound(tuple(_part(part) for part in parts))
+    return _convex(data)
+
+
+def _part(data: Mapping[str, Any]) -> Part:
+    x, y, z, qx, qy, qz, qw = data["pose"]
+    return Part(_convex(data["shape"]), (x, y, z), (qx, qy, qz, qw))
+
+
+def _convex(data: Mapping[str, Any]) -> Convex:
+    match dict(data):
         case {"box": [x, y, z]}:
             return Box((x, y, z))
         case {"cylinder": {"radius": radius, "height": height}}:
             return Cylinder(radius, height)
         case {"sphere": {"radius": radius}}:
             return Sphere(radius)
-    raise ValueError(f"shape {data!r}, expected box, cylinder or sphere")
+        case {"mesh": {"vertices": list(vertices)}}:
+            return Hull(tuple((x, y, z) for x, y, z in vertices))
+    raise ValueError(f"shape {data!r}, expected box, cylinder, sphere, mesh or compound")

@@ -1,5 +1,6 @@
 """The fast collision model: the scene as arrays, checked by compiled code (about a microsecond a configuration)."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -7,23 +8,38 @@ import numpy as np
 from pinocchio import SE3
 
 from planner.motion.chain import chain, placement
-from planner.motion.kernels import (
+from planner.motion.kernels import edge_is_free, hand_contacts
+from planner.motion.tables import (
     BOX,
+    COUNT,
     CYLINDER,
+    FACES,
+    FIRST,
     HALF,
+    HULL,
     LOWER,
     OBSTACLE_COLUMNS,
     PART,
+    PLACE,
     SOLID_COLUMNS,
     SPHERE,
     UPPER,
     ArmArrays,
     SceneArrays,
-    edge_is_free,
-    hand_contacts,
 )
 from planner.motion.world import Margins, Standing
-from scenarios.shapes import Box, Cylinder, Shape, Sphere, bounding_radius, extents
+from scenarios.shapes import (
+    Box,
+    Convex,
+    Cylinder,
+    Hull,
+    Shape,
+    Sphere,
+    bounding_radius,
+    convex_parts,
+    extents,
+    middle,
+)
 from sim.robot import RobotModel
 from sim.scene import Held, SceneState
 
@@ -41,7 +57,7 @@ _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z i
 
 
 class FastChecker:
-    """Spheres, boxes and cylinders in numba, for planners: never calls free what the exact model calls a collision.
+    """Convex solids in numba, for planners: never calls free what the exact model calls a collision.
 
     Where it may refuse what is free (by millimetres, near corners and rims) is told in `kernels`.
     Link 0 never moves, so it is checked against the arm and the held body only, not against the scene.
@@ -71,9 +87,10 @@ class FastChecker:
 def hand_hits(robot: RobotModel, scene: SceneState, X_WG: SE3, margins: Margins) -> frozenset[str]:
     """Names of what hand, fingers or held body would come too near to with the gripper at X_WG, wherever the arm is."""
     arm = _arm_arrays(robot, scene.opening, _held(scene))
-    names, table = _obstacle_rows(Standing(scene))
+    names, table, corners = _obstacle_rows(Standing(scene))
     X_W7 = X_WG * robot.model.frames[robot.tcp_id].placement.inverse()
-    hits = hand_contacts(placement(X_W7)[None], arm.solids, table, margins.table(part_names(robot, scene.held), names))
+    allowed = margins.table(part_names(robot, scene.held), names)
+    hits = hand_contacts(placement(X_W7)[None], arm.solids, arm.corners, table, corners, allowed)
     return frozenset(name for name, hit in zip(names, hits, strict=True) if hit)
 
 
@@ -96,7 +113,7 @@ def self_collision_pairs(parts: tuple[str, ...]) -> list[tuple[str, str]]:
     return found + [(rider, inner) for rider in riders for inner in links[:6]]
 
 
-def _kind(shape: Shape) -> int:
+def _kind(shape: Convex) -> int:
     match shape:
         case Box():
             return BOX
@@ -104,6 +121,8 @@ def _kind(shape: Shape) -> int:
             return CYLINDER
         case Sphere():
             return SPHERE
+        case Hull():
+            return HULL
 
 
 class _Spheres(NamedTuple):
@@ -133,8 +152,35 @@ def _spheres(robot: RobotModel) -> _Spheres:
     return _Spheres(np.concatenate(tables), np.array(first), covers)
 
 
-def _solid_row(shape: Shape, X: SE3, part: int) -> np.ndarray:
-    return np.concatenate([[_kind(shape), part, bounding_radius(shape)], extents(shape) / 2, placement(X)])
+_NO_CORNERS = np.zeros((0, 3))
+
+
+def _solid_row(shape: Convex, X: SE3, part: int) -> np.ndarray:
+    """A row of a table of solids (SOLID_COLUMNS,), its corners not counted yet."""
+    row = np.zeros(SOLID_COLUMNS)
+    row[:HALF] = _kind(shape), part, bounding_radius(shape)
+    row[HALF:PLACE] = extents(shape) / 2
+    if isinstance(shape, Hull):
+        X = X * SE3(np.eye(3), middle(shape))
+        row[HALF - 1] = float(np.linalg.norm(shape.solid.vertices - middle(shape), axis=1).max())
+        row[COUNT], row[FACES] = len(shape.solid.vertices), len(shape.solid.normals)
+    row[PLACE:FIRST] = placement(X)
+    return row
+
+
+@lru_cache(maxsize=256)
+def _corners(shape: Convex) -> np.ndarray:
+    """Corners about the middle of the bounding box, then the normals of the faces (n,3)."""
+    if not isinstance(shape, Hull):
+        return _NO_CORNERS
+    return np.concatenate([shape.solid.vertices - middle(shape), shape.solid.normals])
+
+
+def _with_corners(rows: np.ndarray, shapes: Sequence[Convex]) -> np.ndarray:
+    """The corners (n,3) of all shapes, and in `rows` where each shape's begin."""
+    tables = [_corners(shape) for shape in shapes]
+    rows[:, FIRST] = np.cumsum([0, *(len(table) for table in tables[:-1])])
+    return np.concatenate([_NO_CORNERS, *tables])
 
 
 @lru_cache(maxsize=64)
@@ -153,34 +199,43 @@ def _hand_rows(robot: RobotModel, opening: float) -> np.ndarray:
 
 def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | None) -> ArmArrays:
     X_7G = robot.model.frames[robot.tcp_id].placement
-    solids = _hand_rows(robot, opening)
+    solids, corners = _hand_rows(robot, opening), _NO_CORNERS
     probes = X_7G.translation[None]
     if held is not None:
         grip, shape = held
         X_7O = X_7G * grip.X_GO
-        solids = np.concatenate([solids, _solid_row(shape, X_7O, len(robot.links))[None]])
-        corners = _CORNERS * (extents(shape) / 2) @ X_7O.rotation.T + X_7O.translation
-        probes = np.concatenate([probes, corners])
+        parts = convex_parts(shape)
+        rows = np.array([_solid_row(part, X_7O * X_OP, len(robot.links)) for part, X_OP in parts])
+        corners = _with_corners(rows, [part for part, _ in parts])
+        solids = np.concatenate([solids, rows])
+        ends = (middle(shape) + _CORNERS * (extents(shape) / 2)) @ X_7O.rotation.T + X_7O.translation
+        probes = np.concatenate([probes, ends])
     limits = np.stack([robot.q_min, robot.q_max])
     probes = np.append(probes, np.zeros((len(probes), 1)), axis=1)
-    return ArmArrays(*chain(robot), limits, *_spheres(robot), solids, probes)
+    return ArmArrays(*chain(robot), limits, *_spheres(robot), solids, corners, probes)
 
 
 @lru_cache(maxsize=64)
-def _obstacle_rows(standing: Standing) -> tuple[tuple[str, ...], np.ndarray]:
-    """Names, and the table (n, OBSTACLE_COLUMNS) of `kernels`."""
+def _obstacle_rows(standing: Standing) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
+    """Names, the table (n, OBSTACLE_COLUMNS) and that of its corners (h,3), as in `tables`."""
     world = standing.obstacles
-    table = np.zeros((len(world), OBSTACLE_COLUMNS))
-    for row, obstacle in zip(table, world, strict=True):
-        row[:SOLID_COLUMNS] = _solid_row(obstacle.shape, obstacle.X_WS, 0)
-        reach = np.abs(obstacle.X_WS.rotation) @ row[HALF : HALF + 3]
-        row[LOWER : LOWER + 3] = obstacle.X_WS.translation - reach
-        row[UPPER : UPPER + 3] = obstacle.X_WS.translation + reach
-    return tuple(obstacle.name for obstacle in world), table
+    table, corners = placed_rows([(obstacle.shape, obstacle.X_WS) for obstacle in world])
+    return tuple(obstacle.name for obstacle in world), table, corners
+
+
+def placed_rows(solids: Sequence[tuple[Convex, SE3]]) -> tuple[np.ndarray, np.ndarray]:
+    """Table (n, OBSTACLE_COLUMNS) and corners (h,3) of placed solids."""
+    table = np.zeros((len(solids), OBSTACLE_COLUMNS))
+    for row, (shape, X) in zip(table, solids, strict=True):
+        row[:SOLID_COLUMNS] = _solid_row(shape, X, 0)
+        reach = np.abs(X.rotation) @ row[HALF : HALF + 3]
+        row[LOWER : LOWER + 3] = row[FIRST - 3 : FIRST] - reach
+        row[UPPER : UPPER + 3] = row[FIRST - 3 : FIRST] + reach
+    return table, _with_corners(table, [shape for shape, _ in solids])
 
 
 def _scene_arrays(arm: ArmArrays, parts: tuple[str, ...], scene: SceneState, margins: Margins) -> SceneArrays:
-    names, table = _obstacle_rows(Standing(scene))
+    names, table, corners = _obstacle_rows(Standing(scene))
     links, solids = [], []
     for outer, inner in self_collision_pairs(parts):
         margin = margins.within_robot(outer, inner)
@@ -193,7 +248,21 @@ def _scene_arrays(arm: ArmArrays, parts: tuple[str, ...], scene: SceneState, mar
             solids += [(s, b, margin) for s, part in enumerate(arm.solids[:, PART]) if part == a]
     return SceneArrays(
         obstacles=table,
+        corners=corners,
         margins=margins.table(parts, names),
         link_pairs=np.array(links, dtype=float).reshape(-1, 3),
         solid_pairs=np.array(solids, dtype=float).reshape(-1, 3),
     )
+
+
+def clear_of(
+    moving: Sequence[tuple[Convex, SE3]], places: np.ndarray, standing: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """At which of the places (n,12, see `chain`) do the moving solids overlap none of the standing ones? (n,) of bool.
+
+    standing: what `placed_rows` gave.
+    """
+    rows = np.array([_solid_row(shape, X, 0) for shape, X in moving])
+    own = _with_corners(rows, [shape for shape, _ in moving])
+    margins = np.zeros((1, len(standing[0])))
+    return np.array([not hand_contacts(place[None], rows, own, *standing, margins).any() for place in places])

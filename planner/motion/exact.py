@@ -1,4 +1,4 @@
-"""The exact collision model: distances between primitives by coal, many configurations at a time.
+"""The exact collision model: distances between convex solids by coal, many configurations at a time.
 
 It shares the forward kinematics with the fast model, but no geometry. World bounds sort out what is far
 apart; coal measures the rest.
@@ -18,7 +18,8 @@ from planner.motion.chain import place_links
 from planner.motion.collision import ARM_LINKS, part_names, self_collision_pairs
 from planner.motion.world import Margins, Standing
 from planner.refinement import Pair
-from scenarios.shapes import Box, Cylinder, Shape, Sphere, extents
+from scenarios.shapes import Convex, Hull, convex_parts, extents, middle
+from scenarios.solids import geometry, polytope
 from sim.robot import RobotModel
 from sim.scene import SceneState
 
@@ -40,7 +41,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class _Solid:
-    """A primitive of part or obstacle `name`, its pose in link `link` (−1: in W), half extents (3,), coal geometry."""
+    """A convex solid of part or obstacle `name`: pose in link `link` (−1: in W), half extents (3,), coal geometry."""
 
     name: str
     link: int
@@ -99,7 +100,7 @@ def _none(pair: Pair) -> bool:
 
 
 class ExactChecker:
-    """Spheres, boxes and cylinders in coal: for culprits, for lines near contact, for the audit of timed paths."""
+    """Convex solids in coal: for culprits, for lines near contact, for the audit of timed paths."""
 
     def __init__(self, robot: RobotModel, scene: SceneState, margins: Margins | None = None) -> None:
         margins = Margins() if margins is None else margins
@@ -261,19 +262,17 @@ def _riders(robot: RobotModel, scene: SceneState) -> list[_Solid]:
     if scene.held is None:
         return solids
     X_7O = robot.model.frames[robot.tcp_id].placement * scene.held.X_GO
-    shape = scene.scenario.bodies[scene.held.name].shape
-    return [*solids, _solid(scene.held.name, ARM_LINKS - 1, X_7O, shape)]
+    parts = convex_parts(scene.scenario.bodies[scene.held.name].shape)
+    return [*solids, *(_solid(scene.held.name, ARM_LINKS - 1, X_7O * X_OP, part) for part, X_OP in parts)]
 
 
-def _solid(name: str, link: int, X: SE3, shape: Shape) -> _Solid:
-    return _Solid(name, link, X, extents(shape) / 2, _geometry(shape))
+def _solid(name: str, link: int, X: SE3, shape: Convex) -> _Solid:
+    # About the middle of its bounding box, so that half extents bound it on both sides.
+    if not isinstance(shape, Hull):
+        return _Solid(name, link, X, extents(shape) / 2, geometry(shape))
+    return _Solid(name, link, X * SE3(np.eye(3), middle(shape)), extents(shape) / 2, _centred(shape))
 
 
-def _geometry(shape: Shape) -> Any:
-    match shape:
-        case Box(size):
-            return coal.Box(*size)
-        case Cylinder(radius, height):
-            return coal.Cylinder(radius, height)
-        case Sphere(radius):
-            return coal.Sphere(radius)
+@lru_cache(maxsize=256)
+def _centred(hull: Hull) -> Any:
+    return polytope(hull.solid, -middle(hull))

@@ -1,65 +1,40 @@
 """Collision tests compiled with numba: one call checks a configuration or a whole edge.
 
-Solids are boxes, cylinders and spheres with half extents about their centre. A sphere against
+Solids are boxes, cylinders, spheres and hulls with half extents about their centre. A sphere against
 anything is exact. Two solids that aren't spheres are held apart by a separating axis: among the
 axes tried, one along which both are further apart than the margin. For two boxes these are the
 classic fifteen (Gottschalk, Lin, Manocha: OBBTree, 1996), exact at margin zero; with a margin, two corners
 facing each other may be rejected that are apart by a little more. A cylinder against a box or a
 cylinder may be rejected half a millimetre too early on average, rarely a centimetre, where its rim faces an
-edge. Never is a pair accepted that is nearer than its margin.
+edge. Hulls are tested by `gjk`, exactly but for margins below zero. Never is a pair accepted that is nearer than
+its margin.
 
 Everything travels in few, flat tables, because a compiled call pays for every array it is handed. For
 placements see `chain`.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
-BOX = 0
-CYLINDER = 1
-SPHERE = 2
-
-# Columns of a table of solids.
-KIND, PART, BOUND, HALF, PLACE = 0, 1, 2, 3, 6
-SOLID_COLUMNS = 18
-# Columns of a table of obstacles: as above, then the world bounds.
-LOWER, UPPER = 18, 21
-OBSTACLE_COLUMNS = 24
-
-
-class ArmArrays(NamedTuple):
-    """The robot as tables.
-
-    joints (7,12): placement of each joint (revolute about z) in the previous link. base (12,): placement
-    of link 0 in W. limits (2,7): lowest and highest position.
-    spheres (n,4): centre in the link's frame and radius; link i has rows first[i]:first[i+1].
-    covers (8,4): a sphere around each link's spheres. solids (m,18): hand, fingers and held body in
-    link 7. probes (k,4): points in link 7 whose travel along an edge is bounded, as spheres without radius.
-    """
-
-    joints: np.ndarray
-    base: np.ndarray
-    limits: np.ndarray
-    spheres: np.ndarray
-    first: np.ndarray
-    covers: np.ndarray
-    solids: np.ndarray
-    probes: np.ndarray
-
-
-class SceneArrays(NamedTuple):
-    """What the robot may hit.
-
-    obstacles (n,24) in W. margins (parts,n): least distance of robot part and obstacle, −inf: not
-    checked. link_pairs (k,3), solid_pairs (l,3): (link, link, margin) and (solid, link, margin) of the robot itself.
-    """
-
-    obstacles: np.ndarray
-    margins: np.ndarray
-    link_pairs: np.ndarray
-    solid_pairs: np.ndarray
+from planner.motion.gjk import surely_apart
+from planner.motion.tables import (
+    BOUND,
+    COUNT,
+    CYLINDER,
+    FACES,
+    FIRST,
+    HALF,
+    HULL,
+    KIND,
+    LOWER,
+    OBSTACLE_COLUMNS,
+    PART,
+    PLACE,
+    SPHERE,
+    UPPER,
+    ArmArrays,
+    SceneArrays,
+)
 
 
 @njit(cache=True)
@@ -100,10 +75,11 @@ def _place_spheres(links, row, spheres, start, stop, placed):
 
 @njit(cache=True)
 def _place_solids(links, row, solids, placed):
-    """Write `placed` (m,24): the solids (m,18), given in the frame of links[row], in W, with their world bounds."""
+    """Write `placed`: the solids, given in the frame of links[row], in W, with world bounds. Columns: `tables`."""
     for s in range(solids.shape[0]):
         for i in range(PLACE):
             placed[s, i] = solids[s, i]
+        placed[s, FIRST], placed[s, COUNT], placed[s, FACES] = solids[s, FIRST], solids[s, COUNT], solids[s, FACES]
         for r in range(3):
             x, y, z = links[row, 3 * r], links[row, 3 * r + 1], links[row, 3 * r + 2]
             reach = 0.0
@@ -160,13 +136,23 @@ def _bounds_apart(solids, s, obstacles, k, margin):
 
 
 @njit(cache=True)
-def _sphere_hits(x, y, z, reach, obstacles, k):
-    """Does a sphere of radius `reach` (margin included) touch obstacle k?"""
-    if _out_of_bounds(x, y, z, reach, obstacles, k):
-        return False
+def _point_near(x, y, z, reach, solids, k, corners):
+    """Does the point come nearer than `reach` to placed solid k?"""
     p = PLACE + 9
-    dx, dy, dz = x - obstacles[k, p], y - obstacles[k, p + 1], z - obstacles[k, p + 2]
-    return _distance(dx, dy, dz, obstacles, k) < reach
+    dx, dy, dz = x - solids[k, p], y - solids[k, p + 1], z - solids[k, p + 2]
+    if solids[k, KIND] != HULL:
+        return _distance(dx, dy, dz, solids, k) < reach
+    if dx * dx + dy * dy + dz * dz >= (reach + solids[k, BOUND]) ** 2:
+        return False
+    point = np.zeros((1, OBSTACLE_COLUMNS))
+    point[0, KIND], point[0, p], point[0, p + 1], point[0, p + 2] = SPHERE, x, y, z
+    return not surely_apart(point, 0, corners, solids, k, corners, reach)
+
+
+@njit(cache=True)
+def _sphere_hits(x, y, z, reach, obstacles, k, corners):
+    """Does a sphere of radius `reach` (margin included) touch obstacle k?"""
+    return not _out_of_bounds(x, y, z, reach, obstacles, k) and _point_near(x, y, z, reach, obstacles, k, corners)
 
 
 @njit(cache=True)
@@ -232,12 +218,14 @@ def solids_apart(first, i, second, j, margin):
 
 
 @njit(cache=True)
-def _solid_hits(solids, s, obstacles, k, margin):
-    """Does solid s of the hand, placed in W, come nearer to obstacle k than the margin?"""
+def _solid_hits(solids, s, own, obstacles, k, corners, margin):
+    """Does solid s of the hand (corners `own`), placed in W, come nearer to obstacle k than the margin?"""
     p = PLACE + 9
+    if solids[s, KIND] == HULL or obstacles[k, KIND] == HULL:
+        return not surely_apart(solids, s, own, obstacles, k, corners, margin)
     x, y, z = solids[s, p], solids[s, p + 1], solids[s, p + 2]
     if solids[s, KIND] == SPHERE:
-        return _sphere_hits(x, y, z, solids[s, HALF] + margin, obstacles, k)
+        return _sphere_hits(x, y, z, solids[s, HALF] + margin, obstacles, k, corners)
     if obstacles[k, KIND] == SPHERE:
         dx, dy, dz = obstacles[k, p] - x, obstacles[k, p + 1] - y, obstacles[k, p + 2] - z
         return _distance(dx, dy, dz, solids, s) < obstacles[k, HALF] + margin
@@ -245,30 +233,33 @@ def _solid_hits(solids, s, obstacles, k, margin):
 
 
 @njit(cache=True)
-def _hand_hits(solids, obstacles, k, margins):
+def _hand_hits(solids, own, obstacles, k, corners, margins):
     """Does any of the placed solids come too near to obstacle k?"""
     for s in range(solids.shape[0]):
         margin = margins[int(solids[s, PART]), k]
         if margin == -np.inf or _bounds_apart(solids, s, obstacles, k, margin):
             continue
-        if _solid_hits(solids, s, obstacles, k, margin):
+        if _solid_hits(solids, s, own, obstacles, k, corners, margin):
             return True
     return False
 
 
 @njit(cache=True)
-def hand_contacts(links, solids, obstacles, margins):
-    """Which obstacles do the solids, riding on a link placed at links[0] (1,12), come too near to? (n,) of bool."""
+def hand_contacts(links, solids, own, obstacles, corners, margins):
+    """Which obstacles do the solids, riding on a link placed at links[0] (1,12), come too near to? (n,) of bool.
+
+    own, corners: the corners of the solids and of the obstacles.
+    """
     placed = np.empty((solids.shape[0], OBSTACLE_COLUMNS))
     _place_solids(links, 0, solids, placed)
     hits = np.empty(obstacles.shape[0], dtype=np.bool_)
     for k in range(obstacles.shape[0]):
-        hits[k] = _hand_hits(placed, obstacles, k, margins)
+        hits[k] = _hand_hits(placed, own, obstacles, k, corners, margins)
     return hits
 
 
 @njit(cache=True)
-def _links_hit(covers, spheres, first, obstacles, margins):
+def _links_hit(covers, spheres, first, obstacles, corners, margins):
     """Do the placed spheres of links 1 to 7 come too near to something?"""
     for link in range(1, 8):
         x, y, z, cover = covers[link, 0], covers[link, 1], covers[link, 2], covers[link, 3]
@@ -277,7 +268,8 @@ def _links_hit(covers, spheres, first, obstacles, margins):
             if margin == -np.inf or _out_of_bounds(x, y, z, cover + margin, obstacles, k):
                 continue
             for s in range(first[link], first[link + 1]):
-                if _sphere_hits(spheres[s, 0], spheres[s, 1], spheres[s, 2], spheres[s, 3] + margin, obstacles, k):
+                reach = spheres[s, 3] + margin
+                if _sphere_hits(spheres[s, 0], spheres[s, 1], spheres[s, 2], reach, obstacles, k, corners):
                     return True
     return False
 
@@ -303,7 +295,7 @@ def _links_meet(covers, spheres, first, pairs):
 
 
 @njit(cache=True)
-def _hand_meets_arm(solids, spheres, first, pairs):
+def _hand_meets_arm(solids, own, spheres, first, pairs):
     p = PLACE + 9
     for n in range(pairs.shape[0]):
         s, link = int(pairs[n, 0]), int(pairs[n, 1])
@@ -313,7 +305,7 @@ def _hand_meets_arm(solids, spheres, first, pairs):
             dz = spheres[t, 2] - solids[s, p + 2]
             if dx * dx + dy * dy + dz * dz > (reach + solids[s, BOUND]) ** 2:
                 continue
-            if _distance(dx, dy, dz, solids, s) < reach:
+            if _point_near(spheres[t, 0], spheres[t, 1], spheres[t, 2], reach, solids, s, own):
                 return True
     return False
 
@@ -324,16 +316,16 @@ def _is_free(q, arm, scene, links, spheres, covers, solids):
     place_links(q, arm.base, arm.joints, links)
     _place_solids(links, 7, arm.solids, solids)
     for k in range(scene.obstacles.shape[0]):
-        if _hand_hits(solids, scene.obstacles, k, scene.margins):
+        if _hand_hits(solids, arm.corners, scene.obstacles, k, scene.corners, scene.margins):
             return False
     for link in range(8):
         _place_spheres(links, link, arm.spheres, arm.first[link], arm.first[link + 1], spheres)
         _place_spheres(links, link, arm.covers, link, link + 1, covers)
-    if _links_hit(covers, spheres, arm.first, scene.obstacles, scene.margins):
+    if _links_hit(covers, spheres, arm.first, scene.obstacles, scene.corners, scene.margins):
         return False
     if _links_meet(covers, spheres, arm.first, scene.link_pairs):
         return False
-    return not _hand_meets_arm(solids, spheres, arm.first, scene.solid_pairs)
+    return not _hand_meets_arm(solids, arm.corners, spheres, arm.first, scene.solid_pairs)
 
 
 @njit(cache=True)
@@ -374,7 +366,7 @@ def edge_is_free(qa, qb, joint_step, travel_step, *tables):
     checked. The end comes first, then the middle, then the quarters: a blocked edge is found
     blocked soon.
     """
-    arm, scene = ArmArrays(*tables[:8]), SceneArrays(*tables[8:])
+    arm, scene = ArmArrays(*tables[:9]), SceneArrays(*tables[9:])
     for k in range(7):
         if not (arm.limits[0, k] <= qb[k] <= arm.limits[1, k]):
             return False, 1

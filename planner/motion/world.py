@@ -13,7 +13,7 @@ from pinocchio import SE3
 from planner.refinement import Pair
 from scenarios.regions import parts
 from scenarios.scenario import Scenario
-from scenarios.shapes import Box, Shape
+from scenarios.shapes import Box, Convex, Shape, convex_parts
 from sim.scene import SceneState, floor_height, pedestal
 
 FLOOR = "floor"
@@ -28,11 +28,16 @@ _FLOOR_DEPTH = 1.0
 
 
 class Obstacle(NamedTuple):
-    """A solid with its pose X_WS in the world. Several may share a name (the walls of a bin)."""
+    """A convex solid with its pose X_WS in the world. Several may share a name (the walls of a bin)."""
 
     name: str
-    shape: Shape
+    shape: Convex
     X_WS: SE3
+
+
+def _solids(name: str, shape: Shape, X_WO: SE3) -> list[Obstacle]:
+    """A body's convex parts."""
+    return [Obstacle(name, part, X_WO * X_OP) for part, X_OP in convex_parts(shape)]
 
 
 def obstacles(scene: SceneState) -> list[Obstacle]:
@@ -52,7 +57,8 @@ def _surroundings(declared: "_Declared") -> tuple[Obstacle, ...]:
     found.append(Obstacle(TABLE, scenario.table.shape, scenario.table.X_WT))
     for region in scenario.regions.values():
         found += [Obstacle(region.name, shape, region.X_WR * X_RP) for shape, X_RP in parts(region)]
-    found += [Obstacle(fixture.name, fixture.shape, fixture.X_WO) for fixture in scenario.fixtures.values()]
+    for fixture in scenario.fixtures.values():
+        found += _solids(fixture.name, fixture.shape, fixture.X_WO)
     return tuple(found)
 
 
@@ -79,7 +85,7 @@ class Standing:
     def bodies(self) -> list[Obstacle]:
         """The movable bodies."""
         declared = self.scenario.bodies
-        return [Obstacle(name, declared[name].shape, X_WO) for name, X_WO in self.poses]
+        return [solid for name, X_WO in self.poses for solid in _solids(name, declared[name].shape, X_WO)]
 
 
 class _Declared:

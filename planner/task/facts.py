@@ -12,11 +12,13 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import Protocol
 
+from planner.support import supports
 from planner.task.layout import Identity, layout
 from planner.task.pddl import Domain
 from planner.task.primitives import AWAY, GRASPABLE, STUCK
 from planner.task.symbols import Fact
 from scenarios.goal import parse_goal
+from scenarios.names import TABLE
 from sim.scene import SceneState
 
 OBSERVED = frozenset({"in_bin", "put_away", "holding", "hand_empty", "is_sponge"})
@@ -43,11 +45,18 @@ def place_of(scene: SceneState, name: str) -> str | None:
     """Where a body lies: a region's name, "table", or None (in the hand, on the floor, in the air).
 
     In a region: the centre inside its walls and below its rim. On the table: the centre above the
-    plate and the lowest point near its top.
+    plate and the lowest point near its top, or on top of something there (but for crumbs: only what lies
+    on the table itself can be wiped).
     """
     if (scene.held is not None and scene.held.name == name) or name not in scene.poses:
         return None
-    return layout(scene.scenario).place_of(name, scene.poses[name])
+    fixed = layout(scene.scenario)
+    place = fixed.place_of(name, scene.poses[name])
+    if place is not None or fixed.kinds[name] == "crumb" or not fixed.is_over_table(scene.poses[name]):
+        return place
+    beneath = supports(scene, name)
+    stands = any(other in scene.scenario.fixtures or place_of(scene, other) == TABLE for other in beneath)
+    return TABLE if stands else None
 
 
 def observed_facts(scene: SceneState) -> frozenset[Fact]:

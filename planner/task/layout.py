@@ -11,7 +11,7 @@ from scenarios.goal import is_crumb
 from scenarios.names import TABLE
 from scenarios.regions import interior
 from scenarios.scenario import Body, Scenario
-from scenarios.shapes import Box, Cylinder, Shape, Sphere
+from scenarios.shapes import reach
 
 REST_ABOVE = 0.02
 REST_BELOW = 0.01
@@ -59,10 +59,15 @@ class Layout:
             if all(span.holds(p_W) for span in spans):
                 return region
         if all(span.holds(p_W) for span in self._plate):
-            lowest = float(self._up @ X_WO.translation) - _depth(self._shapes[name], X_WO.rotation.T @ self._up)
+            lowest = float(self._up @ X_WO.translation) - reach(self._shapes[name], -X_WO.rotation.T @ self._up)
             if -REST_BELOW <= lowest - self._top <= REST_ABOVE:
                 return TABLE
         return None
+
+    def is_over_table(self, X_WO: SE3) -> bool:
+        """Does a body's centre lie above the table's plate, at whatever height?"""
+        x, y, z = X_WO.translation.tolist()
+        return all(side.holds((x, y, z)) for side in self._plate) and float(self._up @ X_WO.translation) > self._top
 
 
 def layout(scenario: Scenario) -> Layout:
@@ -103,14 +108,3 @@ def _spans(X_WS: SE3, lower: np.ndarray, upper: np.ndarray) -> tuple[Span, ...]:
         x, y, z = axis.tolist()
         spans.append(Span((x, y, z), offset + float(lower[i]), offset + float(upper[i])))
     return tuple(spans)
-
-
-def _depth(shape: Shape, up: np.ndarray) -> float:
-    """How far the shape reaches below its centre, in metres; `up` (3,) is the way up in its own frame."""
-    match shape:
-        case Box(size):
-            return float(np.abs(up) @ np.array(size)) / 2
-        case Cylinder(radius, height):
-            return float(np.hypot(up[0], up[1]) * radius + abs(up[2]) * height / 2)
-        case Sphere(radius):
-            return radius

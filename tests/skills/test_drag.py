@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bench import Bench, action, scene_with, with_pose
+from pinocchio import SE3
 from py_trees.common import Status
 
 from bt_tamp.executive.build import build_planner
@@ -12,11 +13,22 @@ from bt_tamp.options import RunOptions
 from planner.failure import RefinementFailure
 from planner.refinement import Budget, Hints, Refinement, Work
 from planner.task.facts import goal_facts, place_of
-from scenarios.shapes import Box, Sphere
+from scenarios.scenario import Fixture
+from scenarios.shapes import Box, Compound, Cylinder, Hull, Sphere, bounds
 from skills.drag import OVERHANGS, Pull, edge_normal, ends, standing_out
 from skills.pick import Pick
 from skills.pressing import in_order
-from skills.towing import EDGE_MARGIN, GREATEST_FORCE, margin_inside, needed_force, press_pose, pressings, tip_points
+from skills.towing import (
+    EDGE_MARGIN,
+    GREATEST_FORCE,
+    has_level_top,
+    is_on_top,
+    margin_inside,
+    needed_force,
+    press_pose,
+    pressings,
+    tip_points,
+)
 
 DRAG, PICK = action("drag(book, table)"), action("pick(book, table)")
 
@@ -205,3 +217,68 @@ def test_where_the_first_force_fails_a_greater_one_works_and_is_kept_for_the_nex
     solution = planner.search.plan(bench.scene, goal_facts("(holding book)"), np.random.default_rng(0), Work())
     assert [refinement.action for refinement in solution.refinements] == [DRAG, PICK]
     assert solution.refinements[0].sample.pressing.force == worked
+
+
+def slab():
+    """A mesh as large as the book, its top smaller than its base."""
+    rims = [(x, y, z) for x, y, z in ((0.08, 0.11, 0.0), (0.07, 0.1, 0.03))]
+    return Hull.of(np.array([(i * x, j * y, z) for x, y, z in rims for i in (-1, 1) for j in (-1, 1)]))[0]
+
+
+def board():
+    """A compound: a board with a lower strip along one side."""
+    parts = [
+        (Box((0.14, 0.2, 0.03)), SE3.Identity()),
+        (Box((0.02, 0.2, 0.015)), SE3(np.eye(3), np.array([0.08, 0, -0.0075]))),
+    ]
+    return Compound.of(parts)[0]
+
+
+def lying(shape):
+    """The book with another shape, where it lies."""
+    scenario = with_pose(scene_with("book"), "book", 0.6, -0.05, 0.7)
+    X_WO = scenario.bodies["book"].X_WO.copy()
+    X_WO.translation[2] = 0.05 - bounds(shape)[0][2]
+    return with_book(scenario, shape=shape, X_WO=X_WO)
+
+
+@pytest.mark.parametrize("shape", [slab(), board()], ids=["mesh", "compound"])
+def test_a_flat_mesh_or_compound_is_dragged_and_picked_as_a_box_is(shape):
+    bench = Bench(lying(shape))
+    assert bench.do("drag(book, table)") is Status.SUCCESS
+    assert bench.peak_force < 30.0
+    assert bench.do("pick(book, table)") is Status.SUCCESS
+
+
+def test_only_the_highest_flat_faces_are_pressed_on():
+    flat, knobbed = (
+        slab(),
+        Compound.of([(slab(), SE3.Identity()), (Cylinder(0.02, 0.02), SE3(np.eye(3), np.array([0, 0, 0.03])))])[0],
+    )
+    body, X_WO = lying(flat).bodies["book"], SE3.Identity()
+    assert has_level_top(body, X_WO)
+    assert is_on_top(body, X_WO, [np.array([0.06, 0.09, 0.0])])
+    assert not is_on_top(body, X_WO, [np.array([0.07, 0.09, 0.0])]), "over the slope beside the top"
+    with_knob = replace(body, shape=knobbed)
+    assert is_on_top(with_knob, X_WO, [np.array([0.01, 0.0, 0.0])])
+    assert not is_on_top(with_knob, X_WO, [np.array([0.05, 0.0, 0.0])]), "beside the knob"
+    roof = Hull.of(
+        np.array([(x, y, 0.0) for x in (-0.05, 0.05) for y in (-0.05, 0.05)] + [(0.0, y, 0.04) for y in (-0.05, 0.05)])
+    )[0]
+    assert not has_level_top(replace(body, shape=roof), X_WO)
+
+
+def test_walls_along_all_edges_are_named_as_what_keeps_an_object_from_being_dragged_over_one():
+    scenario = with_pose(scene_with("book"), "book", 0.6, -0.05)
+    (x, y, _), (width, depth, _) = scenario.table.X_WT.translation, scenario.table.size
+    sides = [(x + s * (width / 2 - 0.006), y, (0.012, depth, 0.05)) for s in (-1, 1)]
+    sides += [(x, y + s * (depth / 2 - 0.006), (width, 0.012, 0.05)) for s in (-1, 1)]
+    walls = {
+        f"wall_{k}": Fixture(f"wall_{k}", Box(size), SE3(np.eye(3), np.array([x, y, 0.075])), 0.5, (1.0, 1.0, 1.0, 1.0))
+        for k, (x, y, size) in enumerate(sides)
+    }
+    bench = Bench(replace(scenario, fixtures=walls))
+    failure = bench.refine(DRAG)
+    assert isinstance(failure, RefinementFailure)
+    assert "wall_" in failure.reason
+    assert not failure.culprit_sets

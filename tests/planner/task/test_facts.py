@@ -116,3 +116,17 @@ def test_a_body_taken_out_of_the_scene_is_stated_nowhere(tabletop):
 def test_a_goal_that_is_no_conjunction_is_refused():
     with pytest.raises(GoalError, match="expected a conjunction of positive literals"):
         goal_facts("(or (in_bin a b))")
+
+
+def test_what_stands_on_something_on_the_table_is_on_the_table(tabletop):
+    scene = tabletop("lower middle upper").moved("lower", at(0, 0, 0.03)).moved("middle", at(0.01, 0, 0.09))
+    scene = scene.moved("upper", at(0.02, 0, 0.15))
+    assert [place_of(scene, name) for name in ("lower", "middle", "upper")] == ["table"] * 3
+    assert place_of(scene.without(frozenset({"middle"})), "upper") is None
+    beside = scene.moved("middle", at(0.0601, 0, 0.09))
+    assert place_of(beside, "middle") is None
+
+
+def test_a_crumb_on_top_of_something_is_not_on_the_table_where_it_could_be_wiped(tabletop):
+    scene = tabletop("cup", "crumb").moved("cup", at(0, 0, 0.03)).moved("crumb", at(0, 0, 0.07))
+    assert place_of(scene, "crumb") is None

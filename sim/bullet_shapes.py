@@ -1,0 +1,152 @@
+"""Shapes in PyBullet, and the frame about which it turns them.
+
+PyBullet keeps a body's pose as that of its principal axes of inertia, and gives meshes and compounds the inertia of
+their bounding box. So these are built in their principal frame I (about O, the shape's own origin), with the true one.
+"""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pybullet as p
+from pinocchio import SE3
+
+from scenarios.hulls import Polyhedron, ShapeError, polyhedron
+from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, convex_parts, inertia
+from sim.surfaces import triangles
+
+
+def principal_axes(shape: Shape) -> tuple[SE3, np.ndarray] | None:
+    """X_OI and the principal moments (3,) per kg; None for a shape that PyBullet knows how to turn by itself."""
+    if not isinstance(shape, Hull | Compound):
+        return None
+    moments, axes = np.linalg.eigh(inertia(shape, 1.0))
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 2] = -axes[:, 2]
+    return SE3(axes, np.zeros(3)), moments
+
+
+def add_collision_shape(shape: Shape, client: int) -> int:
+    """The number of a new collision shape, a hull or compound in its principal frame."""
+    match shape:
+        case Box(size):
+            return p.createCollisionShape(p.GEOM_BOX, halfExtents=[s / 2 for s in size], physicsClientId=client)
+        case Cylinder(radius, height):
+            return p.createCollisionShape(p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=client)
+        case Sphere(radius):
+            return p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=client)
+        case Hull() | Compound():
+            with _part_arrays(_octants(shape) if isinstance(shape, Hull) else _parts(shape), _R_OI(shape).T) as arrays:
+                number = p.createCollisionShapeArray(**arrays, physicsClientId=client)
+            _take_margin_off(number, client)
+            return number
+
+
+def add_visual_shape(shape: Shape, client: int, **paint: Any) -> int:
+    """The number of a new visual shape, a hull or compound in its own frame O. `paint`: as createVisualShape has it."""
+    match shape:
+        case Box(size):
+            return p.createVisualShape(p.GEOM_BOX, halfExtents=[s / 2 for s in size], physicsClientId=client, **paint)
+        case Cylinder(radius, height):
+            return p.createVisualShape(p.GEOM_CYLINDER, radius=radius, length=height, physicsClientId=client, **paint)
+        case Sphere(radius):
+            return p.createVisualShape(p.GEOM_SPHERE, radius=radius, physicsClientId=client, **paint)
+        case Hull() | Compound():
+            corners = triangles(shape)
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            normals /= np.linalg.norm(normals, axis=1)[:, None]
+            return p.createVisualShape(
+                p.GEOM_MESH,
+                vertices=corners.reshape(-1, 3).tolist(),
+                indices=list(range(3 * len(corners))),
+                normals=np.repeat(normals, 3, axis=0).tolist(),
+                physicsClientId=client,
+                **paint,
+            )
+
+
+def _take_margin_off(number: int, client: int) -> None:
+    """PyBullet puts a margin of 1 mm around every hull, and takes it off the parts of a compound for a multibody only;
+    but the shape stays so for the bodies that are made of it later."""
+    body = p.createMultiBody(1.0, number, physicsClientId=client)
+    p.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
+    p.removeBody(body, physicsClientId=client)
+
+
+def _R_OI(shape: Shape) -> np.ndarray:
+    axes = principal_axes(shape)
+    return np.eye(3) if axes is None else axes[0].rotation
+
+
+_Piece = tuple[Box | Cylinder | Sphere | Polyhedron, SE3]
+
+
+def _parts(shape: Compound) -> list[_Piece]:
+    return [(part.solid if isinstance(part, Hull) else part, X_OP) for part, X_OP in convex_parts(shape)]
+
+
+def _octants(hull: Hull) -> list[_Piece]:
+    """The hull cut along its three axes: PyBullet finds one point of contact at a time for a pair of convex solids, and
+    a hull in one piece would turn about it, in the hand as on the table."""
+    pieces = [hull.solid.vertices]
+    for axis in np.eye(3):
+        pieces = [half for points in pieces for half in _cut(points, axis)]
+    found: list[_Piece] = []
+    for points in pieces:
+        try:
+            found.append((polyhedron(points), SE3.Identity()))
+        except ShapeError:  # a sliver
+            continue
+    return found
+
+
+def _cut(points: np.ndarray, axis: np.ndarray) -> Iterator[np.ndarray]:
+    """The corners (n,3) of both halves of a convex solid with corners (m,3), cut square to the axis at the origin."""
+    height = points @ axis
+    above, below = points[height > 0.0], points[height < 0.0]
+    a, b = np.repeat(above, len(below), axis=0), np.tile(below, (len(above), 1))
+    share = (a @ axis) / ((a - b) @ axis)
+    level = np.concatenate([a + (b - a) * share[:, None], points[height == 0.0]])
+    for side in (above, below):
+        if len(side):
+            yield np.concatenate([side, level])
+
+
+@contextmanager
+def _part_arrays(parts: list[_Piece], R_IO: np.ndarray) -> Iterator[dict[str, list]]:
+    """Arguments of createCollisionShapeArray; polyhedra, which it only takes from files, lie in a temporary folder."""
+    arrays: dict[str, list] = {"shapeTypes": [], "halfExtents": [], "radii": [], "lengths": [], "fileNames": []}
+    positions, quaternions = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (shape, X_OP) in enumerate(parts):
+            kind, half, radius, length, file = p.GEOM_BOX, [0.0] * 3, 0.0, 0.0, ""
+            match shape:
+                case Box(size):
+                    half = [s / 2 for s in size]
+                case Cylinder(r, h):
+                    kind, radius, length = p.GEOM_CYLINDER, r, h
+                case Sphere(r):
+                    kind, radius = p.GEOM_SPHERE, r
+                case Polyhedron():
+                    kind, file = p.GEOM_MESH, str(Path(folder) / f"{number}.obj")
+                    Path(file).write_text(_obj(shape))
+            for key, value in zip(arrays, (kind, half, radius, length, file), strict=True):
+                arrays[key].append(value)
+            positions.append((R_IO @ X_OP.translation).tolist())
+            quaternions.append(pin.Quaternion(R_IO @ X_OP.rotation).coeffs().tolist())
+        yield {
+            **arrays,
+            "meshScales": [[1.0] * 3] * len(parts),
+            "collisionFramePositions": positions,
+            "collisionFrameOrientations": quaternions,
+        }
+
+
+def _obj(solid: Polyhedron) -> str:
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in solid.vertices.tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in solid.triangles.tolist()]
+    return "\n".join(lines) + "\n"
