@@ -10,7 +10,7 @@ from rich.console import Console
 
 from bt_tamp.bench.boxes import BOX, COUNT, TOP, Layout, layouts
 from bt_tamp.bench.checks import Check
-from bt_tamp.executive.loop import run_scenario
+from bt_tamp.bench.whole import whole_run
 from bt_tamp.options import RunOptions
 from bt_tamp.report.events import Event
 from bt_tamp.report.recorder import RunRecorder
@@ -108,8 +108,7 @@ def run_layout(layout: Layout, seed: int = 0) -> DragResult:
     """One whole run: nothing is told to the executive but the scene and the goal, the box in the hand."""
     witness = _Witness()
     recorder = _Recorder(layout, witness)
-    with recorder:
-        result = run_scenario(recorder.scenario, RunOptions(seed=seed, max_sim_time=MAX_SIM_TIME), recorder)
+    result = whole_run(recorder, RunOptions(seed=seed, max_sim_time=MAX_SIM_TIME))
     height = _height(layout, recorder.last)
     is_held = result.places[BOX] == "hand" and height > HELD_ABOVE
     return DragResult(

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from bt_tamp.bench.checks import Check, at_least
 from bt_tamp.bench.crumbs import COUNT, GRAIN_COUNT, GRAINS, PAN, SPONGE, Layout, cubes, grains
-from bt_tamp.executive.loop import run_scenario
+from bt_tamp.bench.whole import whole_run
 from bt_tamp.options import RunOptions
 from bt_tamp.report.events import Event
 from bt_tamp.report.recorder import RunRecorder
@@ -111,10 +111,9 @@ def _presses(data: Mapping) -> bool:
 
 def run_layout(layout: Layout, seed: int = 0) -> WipeResult:
     """One whole run: nothing is told to the executive but the scene and the goal."""
-    scenario = layout.scenario()
     witness = _Witness()
-    with RunRecorder(scenario, None, witness) as recorder:
-        result = run_scenario(scenario, RunOptions(seed=seed, max_sim_time=MAX_SIM_TIME), recorder)
+    recorder = RunRecorder(layout.scenario(), None, witness)
+    result = whole_run(recorder, RunOptions(seed=seed, max_sim_time=MAX_SIM_TIME))
     missed = tuple(name for name, place in result.places.items() if place != PAN and name != SPONGE)
     return WipeResult(
         layout,

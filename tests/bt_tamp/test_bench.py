@@ -12,8 +12,12 @@ from bt_tamp.bench.plots import PLOTS
 from bt_tamp.bench.scene import SPONGE, TABLE_TOP, Truth, believed, sponge_height, true_scene
 from bt_tamp.bench.slide import Case, SlideResult, run_slide
 from bt_tamp.bench.stopwatch import Stopwatch
+from bt_tamp.bench.whole import whole_run
 from bt_tamp.cli import main
 from bt_tamp.commands.bench import BENCHES
+from bt_tamp.options import RunOptions
+from bt_tamp.report.recorder import RunRecorder
+from scenarios.load import load_scenario
 
 NAN = float("nan")
 
@@ -191,3 +195,13 @@ def test_of_three_runs_the_one_in_the_middle_is_told():
     runs = [[Cost("wiping", 3.0, dict.fromkeys(PARTS, 50.0), 40.0, factor)] for factor in (3.5, 2.0, 3.1)]
     assert [cost.real_time for cost in control.middle(runs)] == [3.1]
     assert {check.figure: check.reached for check in control.acceptance(runs)}["wiping: real-time factor"]
+
+
+class _Impatient(RunRecorder):
+    def sample(self, *_):
+        raise KeyboardInterrupt
+
+
+def test_an_interruption_ends_the_benchmark_and_not_only_its_run():
+    with pytest.raises(KeyboardInterrupt):
+        whole_run(_Impatient(load_scenario("fig2", 0)), RunOptions())
