@@ -102,13 +102,18 @@ class SearchThenSample:
         self._plans = PlanRefiner(self._actions, self._state, settings.backtracks, report)
         self._budget = Budget(settings.tries, settings.motion_checks)
         self._samples: dict[GroundAction, tuple[Any, ...]] = {}
+        self._stated: tuple[SceneState, frozenset[Fact]] | None = None
 
     def facts(self, scene: SceneState) -> frozenset[Fact]:
         """What holds in a scene as observed, in the predicates of the domain."""
-        return self._facts(scene, self.learned)
+        # At each tick the goal and the plan are judged by the same scene.
+        if self._stated is None or self._stated[0] is not scene:
+            self._stated = scene, self._facts(scene, self.learned)
+        return self._stated[1]
 
     def plan(self, scene: SceneState, goal: frozenset[Fact], rng: np.random.Generator, work: Work) -> Solution | NoPlan:
         """A plan from the scene as observed, refined whole, or why there is none."""
+        self._stated = None
         self.learned.begin(scene)
         self._actions.forget()
         try:
@@ -131,12 +136,14 @@ class SearchThenSample:
 
         A failure is not learned from until it is handed to `learn`.
         """
+        self._stated = None
         self.learned.observe(scene)
         situation, first = Situation.now(scene), self._samples.get(action, ())
         return self._actions.refine(action, situation, rng, self._budget, work, first=first)[0]
 
     def learn(self, failure: RefinementFailure | ExecutionFailure, scene: SceneState) -> None:
         """Take in a failure met while acting; `scene` is as observed."""
+        self._stated = None
         self.learned.observe(scene)
         situation = Situation.now(scene)
         if isinstance(failure, SceneChanged):
@@ -150,6 +157,7 @@ class SearchThenSample:
 
     def learn_success(self, refinement: Refinement) -> None:
         """Take in that an action was carried out as refined and came to its effect."""
+        self._stated = None
         self.learned.learn_success(refinement.action, refinement.sample)
 
     def _rounds(

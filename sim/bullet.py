@@ -4,6 +4,7 @@ The arm moves by joint torques alone and things are held by friction. A stiff sp
 couples the two fingers, as the gear does in the real gripper. Two frictions combine as their product.
 """
 
+import math
 import tempfile
 import weakref
 from collections.abc import Callable, Iterator, Mapping
@@ -52,6 +53,9 @@ turning on the spot, that of a round patch 9 mm across (two thirds of its radius
 what is held would swing. PyBullet's wrist sensor leaves these torques out, some 0.1 Nm: forces are felt rightly, so a
 load's mass is, but not where its centre lies."""
 
+SEEN_EVERY = 10
+"""Steps between two looks at the bodies: 100 Hz, a fast camera. Joints, fingers and wrist are sensed at each step."""
+
 FLOOR_FRICTION = 0.8
 GEAR_STIFFNESS = 2e4
 """N/m between the fingers' slides. PyBullet's own gear constraint (JOINT_GEAR) would be felt by the wrist
@@ -81,11 +85,14 @@ class BulletPlant:
         self.lap: Callable[[str], None] = _nobody
         self.timestep = PHYSICS_STEP
         self._t = 0.0
+        self._unseen = SEEN_EVERY
+        self._poses: _Converted[SE3] | None = None
+        self._velocities: _Converted[np.ndarray] | None = None
         self._client = p.connect(p.GUI if window else p.DIRECT)
         # A plant that nobody closed keeps its engine, 10 MB and more, until the process ends.
         self._free = weakref.finalize(self, p.disconnect, self._client)
         self._free.atexit = False
-        self._names: dict[int, str] = {}
+        self._names: dict[tuple[int, int], str] = {}
         self._turned: dict[str, tuple[tuple[float, ...], SE3]] = {}
         p.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         p.setPhysicsEngineParameter(
@@ -109,6 +116,23 @@ class BulletPlant:
         sensor = reactions[-1]
         # PyBullet reports the joint's reaction about the child link's centre of mass, on the child.
         force = -np.array(sensor[:3])
+        poses, velocities = self._look()
+        return Observation(
+            t=self._t,
+            q=np.array(q[:7]),
+            v=np.array(v[:7]),
+            tau=self._tau.copy(),
+            opening=q[7] + q[8],
+            opening_velocity=v[7] + v[8],
+            grip_force=(abs(drives[7]) + abs(drives[8])) / 2,
+            wrist=Wrench(force, self._lever @ force - np.array(sensor[3:])),
+            poses=poses,
+            velocities=velocities,
+        )
+
+    def _look(self) -> tuple["_Converted[SE3]", "_Converted[np.ndarray]"]:
+        if self._poses is not None and self._velocities is not None and self._unseen < SEEN_EVERY:
+            return self._poses, self._velocities
         poses, velocities = {}, {}
         for name, body in self._bodies.items():
             position, quaternion = p.getBasePositionAndOrientation(body, physicsClientId=self._client)
@@ -119,26 +143,21 @@ class BulletPlant:
                 )
             poses[name] = position + quaternion
             velocities[name] = linear + angular
-        return Observation(
-            t=self._t,
-            q=np.array(q[:7]),
-            v=np.array(v[:7]),
-            tau=self._tau.copy(),
-            opening=q[7] + q[8],
-            opening_velocity=v[7] + v[8],
-            grip_force=(abs(drives[7]) + abs(drives[8])) / 2,
-            wrist=Wrench(force, self._lever @ force - np.array(sensor[3:])),
-            poses=_Converted(poses, _pose),
-            velocities=_Converted(velocities, np.array),
-        )
+        self._unseen = 0
+        self._poses = _Converted(poses, _pose, self._poses)
+        self._velocities = _Converted(velocities, np.array, self._velocities)
+        return self._poses, self._velocities
 
     def apply(self, command: Command) -> None:
-        if not np.isfinite(command.tau).all():
+        if not math.isfinite(math.fsum(command.tau.tolist())):
             raise ValueError(f"torque command must be finite, got {command.tau}")
         self._tau = np.minimum(np.maximum(command.tau, -self._tau_max), self._tau_max)
         self._torques = self._tau.tolist()
         speed = min(max(float(command.grip.speed), -self._max_grip_speed), self._max_grip_speed) / 2
         force = min(max(float(command.grip.force), 0.0), self._max_grip_force)
+        if (speed, force) == self._grip:
+            return
+        self._grip = speed, force
         p.setJointMotorControlArray(
             self._robot,
             self._finger_joints,
@@ -163,11 +182,13 @@ class BulletPlant:
         p.stepSimulation(physicsClientId=self._client)
         self.lap("physics")
         self._t += PHYSICS_STEP
+        self._unseen += 1
 
     def contacts(self) -> list[Contact]:
         """True contacts that carry force, for reports and benchmarks; the executive never reads them."""
+        names = self._names
         return [
-            Contact(self._name(point[1], point[3]), self._name(point[2], point[4]), point)
+            Contact(names[point[1], point[3]], names[point[2], point[4]], point)
             for point in p.getContactPoints(physicsClientId=self._client)
             if point[NORMAL_FORCE] > 0.0
         ]
@@ -177,7 +198,7 @@ class BulletPlant:
         stands for no single body."""
         bodies = []
         for name in (first, second):
-            found = [body for body, known in self._names.items() if known == name]
+            found = [body for (body, _), known in self._names.items() if known == name]
             if len(found) != 1:
                 raise ValueError(f"{len(found)} bodies are called {name!r}, expected one")
             bodies += found
@@ -198,6 +219,7 @@ class BulletPlant:
             self._bodies[name], list(pose[:3]), list(pose[3:]), physicsClientId=self._client
         )
         p.resetBaseVelocity(self._bodies[name], [0.0] * 3, [0.0] * 3, physicsClientId=self._client)
+        self._unseen = SEEN_EVERY
         # Not only that one: the engine does not see that what rested on it lies on nothing now.
         for body in self._bodies.values():
             p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_WAKE_UP, physicsClientId=self._client)
@@ -233,11 +255,6 @@ class BulletPlant:
         known = ", ".join(n for i, n in sorted(self._link_names.items()) if i >= 0)
         raise ValueError(f"no moving link {name!r}, known: {known}")
 
-    def _name(self, body: int, link: int) -> str:
-        if body == self._robot:
-            return self._link_names[link]
-        return self._names[body]
-
     def _add(
         self, name: str, shape: Shape, X_WO: SE3, friction: float, mass: float, color: tuple[float, float, float, float]
     ) -> int:
@@ -257,11 +274,11 @@ class BulletPlant:
             physicsClientId=self._client,
         )
         if axes is not None:
-            # Moments without the mass make a rigid body one of no mass.
+            # PyBullet would put a margin of 1 mm around every hull.
             p.changeDynamics(
                 body,
                 -1,
-                mass=mass,
+                collisionMargin=0.0,
                 localInertiaDiagonal=[mass * moment for moment in axes[1]],
                 physicsClientId=self._client,
             )
@@ -276,7 +293,7 @@ class BulletPlant:
             sleepThreshold=ASLEEP,
             physicsClientId=self._client,
         )
-        self._names[body] = name
+        self._names[body, -1] = name
         return body
 
     def _add_room(self, scenario: Scenario) -> None:
@@ -333,6 +350,7 @@ class BulletPlant:
         info = [p.getJointInfo(self._robot, j, physicsClientId=self._client) for j in joints]
         index = {entry[1].decode(): entry[0] for entry in info}
         self._link_names = {-1: "link_0"} | {entry[0]: entry[12].decode() for entry in info}
+        self._names |= {(self._robot, link): name for link, name in self._link_names.items()}
         self._arm_joints = [index[f"joint_{i}"] for i in range(1, 8)]
         self._finger_joints = [index["finger_left_slide"], index["finger_right_slide"]]
         self._sensor_joint = index["wrist_sensor"]
@@ -341,6 +359,7 @@ class BulletPlant:
         hand = p.getDynamicsInfo(self._robot, self._sensor_joint, physicsClientId=self._client)
         self._lever = pin.skew(np.array(hand[3]))
         self._tau = np.zeros(7)
+        self._grip: tuple[float, float] | None = None
         self._tau_max = robot.tau_max
         self._max_grip_force = robot.gripper.max_force
         self._max_grip_speed = robot.gripper.max_speed
@@ -373,11 +392,19 @@ def _nobody(part: str) -> None:
 
 
 class _Converted(Mapping[str, T], Generic[T]):
-    """What the engine said of each body, converted when it is asked for: most control ticks look at the arm only."""
+    """What the engine said of each body, converted when it is asked for. What has not changed since `before` stays the
+    same object, which those who look at it know again."""
 
-    def __init__(self, raw: dict[str, tuple[float, ...]], convert: Callable[[tuple[float, ...]], T]) -> None:
+    def __init__(
+        self,
+        raw: dict[str, tuple[float, ...]],
+        convert: Callable[[tuple[float, ...]], T],
+        before: "_Converted[T] | None",
+    ) -> None:
         self._raw, self._convert = raw, convert
         self._known: dict[str, T] = {}
+        if before is not None:
+            self._known = {name: known for name, known in before._known.items() if before._raw[name] == raw[name]}
 
     def __getitem__(self, name: str) -> T:
         if name not in self._known:

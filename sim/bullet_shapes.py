@@ -41,9 +41,7 @@ def add_collision_shape(shape: Shape, client: int) -> int:
             return p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=client)
         case Hull() | Compound():
             with _part_arrays(_octants(shape) if isinstance(shape, Hull) else _parts(shape), _R_OI(shape).T) as arrays:
-                number = p.createCollisionShapeArray(**arrays, physicsClientId=client)
-            _take_margin_off(number, client)
-            return number
+                return p.createCollisionShapeArray(**arrays, physicsClientId=client)
 
 
 def add_visual_shape(shape: Shape, client: int, **paint: Any) -> int:
@@ -67,14 +65,6 @@ def add_visual_shape(shape: Shape, client: int, **paint: Any) -> int:
                 physicsClientId=client,
                 **paint,
             )
-
-
-def _take_margin_off(number: int, client: int) -> None:
-    """PyBullet puts a margin of 1 mm around every hull, and takes it off the parts of a compound for a multibody only;
-    but the shape stays so for the bodies that are made of it later."""
-    body = p.createMultiBody(1.0, number, physicsClientId=client)
-    p.changeDynamics(body, -1, collisionMargin=0.0, physicsClientId=client)
-    p.removeBody(body, physicsClientId=client)
 
 
 def _R_OI(shape: Shape) -> np.ndarray:

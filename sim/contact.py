@@ -1,7 +1,6 @@
 """True points of contact, as the engine tells them."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -9,8 +8,7 @@ NORMAL_FORCE = 9
 """Where an entry of `getContactPoints` has the normal force."""
 
 
-@dataclass(frozen=True, slots=True)
-class Contact:
+class Contact(NamedTuple):
     """A true contact point between two named things, as the engine tells it (`getContactPoints`)."""
 
     first: str

@@ -4,8 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from planner.failure import Failure, RefinementFailure
 from planner.refinement import Phase, Refinement
 from planner.task.symbols import GroundAction
@@ -34,7 +32,7 @@ class GripDriver:
 
     def open_to(self, opening: float) -> None:
         """Bring the fingers `opening` metres apart and keep them there."""
-        self._target = float(np.clip(opening, 0.0, self._gripper.stroke))
+        self._target = min(max(float(opening), 0.0), self._gripper.stroke)
 
     def close(self, force: float) -> None:
         """Close until an object resists, and go on pressing with `force` N each."""
@@ -46,7 +44,7 @@ class GripDriver:
             return GripCommand(-CLOSING_SPEED, self._force)
         error = self._target - observation.opening
         limit = self._gripper.max_speed / 2
-        return GripCommand(float(np.clip(OPENING_GAIN * error, -limit, limit)), self._gripper.max_force)
+        return GripCommand(min(max(OPENING_GAIN * error, -limit), limit), self._gripper.max_force)
 
 
 @dataclass

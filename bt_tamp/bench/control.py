@@ -30,8 +30,11 @@ PARTS = ("observe", *CONTROL_PARTS, "apply", "record", "tree", "drive", "physics
 """record: signals taken down and true contacts judged. drive: torques and the fingers' gear given to the engine.
 physics: the engine's bare step."""
 
-THINKING = 0.05
-"""CPU seconds beyond which a tick of the tree has planned: left out, as planning isn't control."""
+THINKING = 0.005
+"""CPU seconds beyond which a tick of the tree has planned or refined an action: left out, as that isn't control."""
+
+LAPPED = 100
+"""Control ticks with the watch at each part, then as many without it: looking at it costs as much as a part does."""
 
 LONGEST = 120.0
 ENOUGH = 3.0
@@ -42,7 +45,7 @@ ENOUGH = 3.0
 class Cost:
     """One regime, "free" or "wiping". Per control tick, in microseconds of CPU time: the mean of each part, and the
     median of building and solving the QP. real_time: simulated seconds by seconds of CPU, everything included but
-    planning."""
+    planning, in the ticks whose parts are not timed."""
 
     regime: str
     seconds: float
@@ -97,24 +100,29 @@ def run(seed: int) -> Run:
     machine = build(scenario, RunOptions(seed=seed), _ignore, _ignore)
     audits, tally = Audits.of(machine), Tally()
     watches = {regime: Stopwatch(longest=THINKING) for regime in ("free", "wiping", "")}
+    lapped = dict.fromkeys(watches, 0)
     spent = {regime: [0.0, 0.0] for regime in watches}
     n = 0
     with TemporaryDirectory() as folder, RunRecorder(scenario, RunFolder(Path(folder))) as recorder:
         while tally.t < LONGEST and min(spent[r][0] for r in ("free", "wiping")) < ENOUGH:
-            regime = _regime(machine)
-            machine.plant.lap = machine.context.controller.lap = watches[regime].lap
+            regime, is_lapped = _regime(machine), n // LAPPED % 2 == 0
+            watch = watches[regime]
+            machine.plant.lap = machine.context.controller.lap = watch.lap if is_lapped else _ignore
             before = time.thread_time()
-            watches[regime].start()
+            watch.start()
             look(machine, tally, n)
             looked = time.thread_time()
             act(machine, recorder, audits, tally, n)
-            spent[regime][0] += CONTROL_EVERY * machine.plant.timestep
-            spent[regime][1] += time.thread_time() - (looked if looked - before > THINKING else before)
+            if is_lapped:
+                lapped[regime] += 1
+            else:
+                spent[regime][0] += CONTROL_EVERY * machine.plant.timestep
+                spent[regime][1] += time.thread_time() - (looked if looked - before > THINKING else before)
             n += 1
     machine.plant.close()
     if not spent["wiping"][0]:
         raise ValueError(f"{SCENE}, seed {seed}: no stroke within {LONGEST:g} simulated seconds")
-    return [_cost(regime, watches[regime], *spent[regime]) for regime in ("free", "wiping")]
+    return [_cost(regime, watches[regime], lapped[regime], *spent[regime]) for regime in ("free", "wiping")]
 
 
 def _regime(machine: Machine) -> str:
@@ -125,8 +133,7 @@ def _regime(machine: Machine) -> str:
     return "wiping" if phase.kind in WIPING else "free" if phase.kind in FREE else ""
 
 
-def _cost(regime: str, watch: Stopwatch, simulated: float, real: float) -> Cost:
-    ticks = simulated / (CONTROL_EVERY * 1e-3)
+def _cost(regime: str, watch: Stopwatch, ticks: int, simulated: float, real: float) -> Cost:
     parts = {part: 1e6 * watch.total(part) / ticks for part in PARTS}
     qp = watch.median("QP build") + watch.median("solve")
     return Cost(regime, simulated, parts, qp, simulated / real)

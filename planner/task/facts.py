@@ -9,11 +9,10 @@ away(o)           o isn't where it is known to be in the way
 """
 
 from collections.abc import Iterable
-from functools import lru_cache
 from typing import Protocol
 
 from planner.support import supports
-from planner.task.layout import Identity, layout
+from planner.task.layout import layout
 from planner.task.pddl import Domain
 from planner.task.primitives import AWAY, GRASPABLE, STUCK
 from planner.task.symbols import Fact
@@ -61,13 +60,6 @@ def place_of(scene: SceneState, name: str) -> str | None:
 
 def observed_facts(scene: SceneState) -> frozenset[Fact]:
     """The facts that the scene alone decides."""
-    return _observed(Identity(scene))
-
-
-# Goal and plan are both judged by the facts of the same scene, at every tick.
-@lru_cache(maxsize=2)
-def _observed(same: Identity) -> frozenset[Fact]:
-    scene: SceneState = same.it
     fixed = layout(scene.scenario)
     found = {Fact("hand_empty") if scene.held is None else Fact("holding", (scene.held.name,))}
     found |= {Fact("is_sponge", (name,)) for name in fixed.sponges if name in scene.poses}

@@ -42,6 +42,8 @@ class Layout:
         self.bins = frozenset(name for name, kind in self.surfaces.items() if kind == "bin")
         self._shapes = {name: body.shape for name, body in scenario.bodies.items()}
         self._regions = []
+        # Asked at every tick of the tree; most of what lies there has not moved since the last one.
+        self._last: dict[str, tuple[SE3, str | None]] = {}
         for name, region in scenario.regions.items():
             lower, upper = interior(region)
             spans = _spans(region.X_WR, lower - [0.0, 0.0, REST_BELOW], upper)
@@ -53,6 +55,13 @@ class Layout:
 
     def place_of(self, name: str, X_WO: SE3) -> str | None:
         """The region in which a body's centre lies, or the table on which it rests, or None."""
+        X_last, place = self._last.get(name, (None, None))
+        if X_last is not X_WO:
+            place = self._found_place_of(name, X_WO)
+            self._last[name] = X_WO, place
+        return place
+
+    def _found_place_of(self, name: str, X_WO: SE3) -> str | None:
         x, y, z = X_WO.translation.tolist()
         p_W = (x, y, z)
         for region, spans in self._regions:

@@ -64,7 +64,7 @@ class ContactWrench:
         last, self._last_v = self._last_v, state.v
         if last is None:
             return
-        self.is_silent = not math.isfinite(wrist.force.sum() + wrist.torque.sum())
+        self.is_silent = not math.isfinite(math.fsum((*wrist.force.tolist(), *wrist.torque.tolist())))
         if self.is_silent:
             return
         contact = np.empty(6)
@@ -73,9 +73,8 @@ class ContactWrench:
         contact -= self._bias_G
         if self._taring is not None:
             contact = self._go_on_taring(self._taring, contact)
-        self._smooth_G = self._smooth_G + self._blend * (contact - self._smooth_G)
-        self.raw = _in_axes(state.R, contact)
-        self.smooth = _in_axes(state.R, self._smooth_G)
+        self.raw, self.smooth = np.empty(6), np.empty(6)
+        _smooth(contact, self._blend, state.R, self._smooth_G, self.raw, self.smooth)
 
     @property
     def credible(self) -> np.ndarray:
@@ -154,8 +153,17 @@ def hand_inertia(robot: RobotModel) -> pin.Inertia:
     return total
 
 
-def _in_axes(rotation: np.ndarray, wrench: np.ndarray) -> np.ndarray:
-    return (wrench.reshape(2, 3) @ rotation.T).ravel()
+@njit(cache=True)
+def _smooth(contact, blend, R, smooth_G, raw, smooth):
+    """Blend the wrench `contact` (6,), in G, into `smooth_G`, and turn both into W's axes: `raw` and `smooth`."""
+    for i in range(6):
+        smooth_G[i] += blend * (contact[i] - smooth_G[i])
+    for part in (0, 3):
+        for i in range(3):
+            raw[part + i] = smooth[part + i] = 0.0
+            for j in range(3):
+                raw[part + i] += R[i, j] * contact[part + j]
+                smooth[part + i] += R[i, j] * smooth_G[part + j]
 
 
 @njit(cache=True)
