@@ -26,6 +26,7 @@ from sim.contact import NORMAL_FORCE, Contact
 from sim.plant import Command, GripCommand, Observation
 from sim.robot import GRAVITY, RobotModel
 from sim.scene import floor_height, pedestal
+from sim.window import frame_scene
 from sim.wrench import Wrench
 
 T = TypeVar("T")
@@ -105,6 +106,8 @@ class BulletPlant:
         self._add_room(scenario)
         self._bodies = {name: self._add_body(name) for name in scenario.bodies}
         self._add_robot(scenario, robot)
+        if window:
+            frame_scene(scenario, self._client)
 
     def close(self) -> None:
         """Free the engine. The plant can't be used afterwards."""
