@@ -35,11 +35,6 @@ PHYSICS_STEP = 1e-3
 """Seconds a step: at 240 Hz a sponge held by friction turns in the hand."""
 
 SOLVER_ITERATIONS = 50
-"""At most, in a step."""
-
-RESIDUAL = 1e-6
-"""(m/s)²: no contact's velocity changed by more than 1 mm/s in the last iteration. Bullet's own 1e-7 costs a quarter
-more while wiping, and no figure of `bench force` is better for it."""
 
 CONTACT_BREAKING = 0.002
 """Metres after which a contact point is given up. With Bullet's own 0.02 stale points under the pads let a book
@@ -104,7 +99,6 @@ class BulletPlant:
         p.setPhysicsEngineParameter(
             fixedTimeStep=PHYSICS_STEP,
             numSolverIterations=SOLVER_ITERATIONS,
-            solverResidualThreshold=RESIDUAL,
             deterministicOverlappingPairs=1,
             contactBreakingThreshold=CONTACT_BREAKING,
             physicsClientId=self._client,
