@@ -291,7 +291,7 @@ class SearchThenSample:
     def _facts(self, scene: SceneState, learned: Learned) -> frozenset[Fact]:
         if self._given is not None:
             return self._given.facts(self._domain, scene, learned)
-        return stated_in(self._domain, self._objects(scene), facts(scene, learned))
+        return facts(scene, learned)
 
     def _state(self, scene: SceneState) -> frozenset[Fact]:
         return stated_in(self._domain, self._objects(scene), observed_facts(scene))

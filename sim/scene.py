@@ -63,6 +63,8 @@ class SceneState:
 
 def pose_distance(X_WA: SE3, X_WB: SE3) -> tuple[float, float]:
     """Distance in metres and angle in rad between two poses."""
+    if X_WA is X_WB:  # A body that lies still is observed as the same object again.
+        return 0.0, 0.0
     cosine = (float(np.vdot(X_WA.rotation, X_WB.rotation)) - 1.0) / 2.0  # vdot(A, B) is the trace of Aᵀ B
     distance = math.dist(X_WA.translation.tolist(), X_WB.translation.tolist())
     return distance, math.acos(min(max(cosine, -1.0), 1.0))
