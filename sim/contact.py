@@ -21,6 +21,12 @@ class Contact(NamedTuple):
         return self.point[NORMAL_FORCE]
 
     @property
+    def lift(self) -> float:
+        """N of `force` along z of W."""
+        point = self.point
+        return point[7][2] * point[NORMAL_FORCE] + point[11][2] * point[10] + point[13][2] * point[12]
+
+    @property
     def position(self) -> np.ndarray:
         """(3,) in W, on the second."""
         return np.array(self.point[6])

@@ -69,5 +69,5 @@ def _upward(contacts: Sequence[Contact], tool: frozenset[str]) -> float:
     up = 0.0
     for contact in contacts:
         if (contact.first in tool) != (contact.second in tool):
-            up += float(contact.force[2]) if contact.first in tool else -float(contact.force[2])
+            up += contact.lift if contact.first in tool else -contact.lift
     return up
