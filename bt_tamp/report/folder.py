@@ -51,6 +51,8 @@ class RunFolder:
         """Raise FolderError unless the folder can be made and written, without making it."""
         if not self.numbered and not self.force and (self.wanted / RESULT).exists():
             raise FolderError(f"{self.wanted}: holds a run's result; --force replaces it, --out takes another folder")
+        if not self.numbered and self._is_foreign():
+            raise FolderError(f"{self.wanted}: holds other things than a run, expected a new or empty folder")
         existing = self.wanted
         while not existing.exists() and existing != existing.parent:
             existing = existing.parent
@@ -58,6 +60,13 @@ class RunFolder:
             raise FolderError(f"{existing}: is not a folder, expected one to write the run into")
         if not os.access(existing, os.W_OK | os.X_OK):
             raise FolderError(f"{existing}: no permission to write there; give another folder with --out")
+
+    def _is_foreign(self) -> bool:
+        """Would a run be written among things that no run wrote, and clear what only has the same name?"""
+        if not self.wanted.is_dir() or not os.access(self.wanted, os.R_OK | os.X_OK):
+            return False
+        names = {entry.name for entry in self.wanted.iterdir()}
+        return bool(names) and names.isdisjoint((RESULT, EVENTS))
 
     @property
     def path(self) -> Path:

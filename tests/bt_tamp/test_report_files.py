@@ -98,6 +98,15 @@ def test_a_folder_with_a_result_is_refused(tmp_path: Path) -> None:
         RunFolder.for_run("scene", 0, tmp_path, force=False)
 
 
+@pytest.mark.parametrize("force", [False, True])
+def test_a_folder_of_other_things_is_refused_and_left_alone(tmp_path: Path, force: bool) -> None:
+    (tmp_path / "plans").mkdir()
+    (tmp_path / "plans" / "mine.txt").write_text("dear")
+    with pytest.raises(FolderError, match="holds other things than a run"):
+        RunFolder(tmp_path, force=force).write("result.json", "{}")
+    assert (tmp_path / "plans" / "mine.txt").read_text() == "dear"
+
+
 def test_a_file_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
     target = tmp_path / "file.txt"
     target.write_text("old")
