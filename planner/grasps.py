@@ -117,44 +117,43 @@ def _symmetries(shape: Box | Cylinder | Sphere) -> list[np.ndarray]:
 
 def _box_grasps(size: np.ndarray, gripper: Gripper) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
     """Rotation (3,3), position (3,) and width of every grasp of a box, in its frame."""
+    axes = np.eye(3)
     for axis in range(3):
         width = float(size[axis])
         if width > gripper.stroke - 2 * CLEARANCE:
             continue
         first, second = (axis + 1) % 3, (axis + 2) % 3
-        closing = np.eye(3)[axis]
+        closing = axes[axis]
         for angle in np.arange(0.0, 2 * np.pi - 1e-9, APPROACH_STEP):
-            approach = np.cos(angle) * np.eye(3)[first] + np.sin(angle) * np.eye(3)[second]
-            for side, entry, exit_ in _lines_through(size, approach, axis):
-                lateral = np.cross(approach, closing)
+            c, s = float(np.cos(angle)), float(np.sin(angle))
+            approach = c * axes[first] + s * axes[second]
+            lateral = s * axes[first] - c * axes[second]
+            hands = [np.array([-sign * lateral, sign * closing, approach]).T for sign in (1.0, -1.0)]
+            for side, entry, exit_ in _lines_through((float(size[first]), float(size[second])), (c, s)):
                 for depth in sorted({min(depth, exit_ - entry - TIP_CLEARANCE) for depth in DEPTHS}):
                     if depth < min(MIN_DEPTH, 0.6 * (exit_ - entry)):
                         continue
                     position = lateral * side + approach * (entry + depth)
-                    for sign in (1.0, -1.0):
-                        y = sign * closing
-                        R_FG = np.column_stack([np.cross(y, approach), y, approach])
+                    for R_FG in hands:
                         yield R_FG, position, width
 
 
-def _lines_through(size: np.ndarray, approach: np.ndarray, axis: int) -> Iterator[tuple[float, float, float]]:
-    """Parallel lines along `approach` through the box's cross-section square to `axis`.
+def _lines_through(size: tuple[float, float], approach: tuple[float, float]) -> Iterator[tuple[float, float, float]]:
+    """Parallel lines along the unit vector `approach` through a rectangle of `size`.
 
     Yields (lateral offset, entry, exit) in metres from the centre, offsets on a grid about 0 that
     leaves half a finger's width of material at either side.
     """
-    closing = np.eye(3)[axis]
-    lateral = np.cross(approach, closing)
-    reach = float(np.abs(lateral) @ (size / 2)) - 0.01
+    lateral = approach[1], -approach[0]
+    reach = (abs(lateral[0]) * size[0] + abs(lateral[1]) * size[1]) / 2 - 0.01
     steps = int(max(reach, 0.0) / SIDE_STEP)
     for k in range(-steps, steps + 1):
         side = k * SIDE_STEP
         entry, exit_ = -np.inf, np.inf
-        for other in range(3):
-            if other == axis or abs(approach[other]) < 1e-9:
-                continue
-            near = (-np.sign(approach[other]) * size[other] / 2 - lateral[other] * side) / approach[other]
-            far = (np.sign(approach[other]) * size[other] / 2 - lateral[other] * side) / approach[other]
-            entry, exit_ = max(entry, near), min(exit_, far)
+        for way, across, length in zip(approach, lateral, size, strict=True):
+            if abs(way) > 1e-9:
+                half = length / 2 if way > 0.0 else -length / 2
+                entry = max(entry, (-half - across * side) / way)
+                exit_ = min(exit_, (half - across * side) / way)
         if exit_ > entry:
-            yield side, float(entry), float(exit_)
+            yield side, entry, exit_

@@ -121,11 +121,15 @@ def placements(
             if (R_target := _turned(R_upright, X_GO, float(tilt), float(yaw), surface)) is not None
         ]
         found.sort(key=lambda way: way[:2])
-        fits = [_fit(shape, surface, R_target) for _, _, R_target in found]
-        for _ in range(spots):
+        fits: list[_Fit] = []
+        for _, _, R_target in found:
+            fit = _fit(shape, surface, R_target)
+            if fit is not None:
+                fits.append(fit)
+                yield _placement(surface, fit, rng)
+        for _ in range(1, spots):
             for fit in fits:
-                if fit is not None:
-                    yield _placement(surface, fit, rng)
+                yield _placement(surface, fit, rng)
 
 
 def _turned(R_upright: np.ndarray, X_GO: SE3, tilt: float, yaw: float, surface: Surface) -> np.ndarray | None:

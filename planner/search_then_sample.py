@@ -16,6 +16,7 @@ from planner.action_refinement import ActionRefiner
 from planner.failure import ExecutionFailure, RefinementFailure, SceneChanged
 from planner.plan_refinement import PlanRefiner, RefinedPlan, Report, Stuck
 from planner.refinement import Budget, Refinement, Refiners, Work
+from planner.sharing import shared_out
 from planner.task.compilation import with_constraints
 from planner.task.facts import facts, objects_of, observed_facts, place_of, stated_in
 from planner.task.given import Given
@@ -199,6 +200,8 @@ class SearchThenSample:
         domain, problem = with_constraints(self._domain, stated, learned.constraints())
         texts = write_domain(domain), write_problem(problem)
         found = self._solved(*texts, problem)
+        if isinstance(found, TaskPlan):
+            found = shared_out(found, domain, problem)
         work.add("expansions", found.expansions)
         plan = [str(action) for action in found.actions] if isinstance(found, TaskPlan) else None
         event = {"round": number, "domain": texts[0], "problem": texts[1], "plan": plan}

@@ -91,7 +91,12 @@ class Place:
         holding = (self._kit.robot.X_WG(scene.q), scene.held.X_GO)
         ways = [placements(body.shape, holding, surface, rng) for surface in surfaces(scene, goal)]
         drawn = (sample for turn in zip_longest(*ways) for sample in turn if sample is not None)
-        samples = clear_first(drawn, body, standing_about(scene))
+
+        def has_room(placement: Placement) -> bool:
+            X_WG = placement.X_WO * holding[1].inverse()
+            return hand_would_hit(self._kit, scene, X_WG, pairs(self._kit.robot.finger_links, name)) is None
+
+        samples = clear_first(drawn, body, standing_about(scene), has_room)
         nothing = f"{name}, as it is held, fits nowhere in {goal}"
         return refine_by_sampling(action, scene, samples, attempt, budget, hints, nothing)
 

@@ -71,7 +71,7 @@ class Toolkit:
 
 @dataclass(frozen=True)
 class Unfit:
-    """A sample refused by a cheap look, before any motion was sought; culprits as in `Blocked`."""
+    """A sample refused by a cheap look, before any motion was sought. All of the culprits have to go before it works."""
 
     reason: str
     culprits: frozenset[str] = frozenset()
@@ -190,7 +190,8 @@ def refine_by_sampling(
     """Try samples in turn, hinted ones first, until one works or the budget is spent. `nothing`: why there may be none.
 
     A sample that fails is tried again without the other movable bodies; if it works then, those
-    of them that its motion would have hit are its culprits.
+    of them that its motion would have hit are its culprits. One for which another's culprits and more have to go is
+    not looked into further: nothing would follow from it.
     """
     attempts: list[Blocked] = []
     counted = uncounted = 0
@@ -199,7 +200,8 @@ def refine_by_sampling(
         outcome = attempt(sample, scene)
         if isinstance(outcome, tuple):
             return Refinement(action, sample, outcome)
-        blocked = Blocked(sample, outcome.reason, _culprits(action, sample, scene, attempt, outcome))
+        known = [entry.culprits for entry in attempts if entry.culprits] if sample not in hints.first else []
+        blocked = Blocked(sample, outcome.reason, _culprits(action, sample, scene, attempt, outcome, known))
         reasons[blocked.reason] = reasons.get(blocked.reason, 0) + 1
         if isinstance(outcome, Unfit) and not blocked.culprits:
             uncounted += 1
@@ -222,23 +224,32 @@ def _in_order(samples: Iterable[Any], hints: Hints) -> Iterable[Any]:
 
 
 def _culprits(
-    action: GroundAction, sample: Any, scene: SceneState, attempt: Attempt, outcome: MotionFailure | Unfit
+    action: GroundAction,
+    sample: Any,
+    scene: SceneState,
+    attempt: Attempt,
+    outcome: MotionFailure | Unfit,
+    known: Sequence[frozenset[str]],
 ) -> frozenset[str]:
     """Movable bodies without which the sample works and which its motion then would hit; empty if it doesn't.
 
-    The action's own objects are none: without them there is nothing to do.
+    The action's own objects are none: without them there is nothing to do. Where a cheap look alone tells that one of
+    the `known` sets has to go and more, that is all that is found out.
     """
     own = frozenset(action.args)
     if not outcome.culprits or outcome.culprits & own:
         return frozenset()
-    suspects = outcome.culprits
+    suspects, is_sure = outcome.culprits, isinstance(outcome, Unfit)
     for _ in range(len(scene.poses)):
+        if is_sure and any(culprits <= suspects for culprits in known):
+            return suspects
         again = attempt(sample, scene.without(suspects))
         if isinstance(again, tuple):
-            return _needed(suspects, sample, scene, attempt)
+            return suspects if is_sure else _needed(suspects, sample, scene, attempt)
         if not again.culprits or again.culprits <= suspects or again.culprits & own:
             return frozenset()
         suspects = suspects | again.culprits
+        is_sure = is_sure and isinstance(again, Unfit)
     return frozenset()
 
 

@@ -175,7 +175,12 @@ class Wipe:
         grip = _Broadside.of(scene.scenario.bodies[held.name].shape, held)
         ways = sorted((False, True), key=lambda flip: -float(np.trace(R_WO.T @ grip.turned(stroke.heading, flip))))
         outcome = self._pushed(action, wiping, place.opening, scene, ways[0])
-        return self._pushed(action, wiping, place.opening, scene, ways[1]) if isinstance(outcome, Unfit) else outcome
+        if isinstance(outcome, Unfit):
+            outcome = self._pushed(action, wiping, place.opening, scene, ways[1])
+        if isinstance(outcome, Unfit) and outcome.culprits:
+            # Not all of them have to go: the first way round may need less.
+            return MotionFailure(outcome.reason, outcome.culprits)
+        return outcome
 
     def _pushed(
         self, action: GroundAction, wiping: Wiping, opening: Opening, scene: SceneState, flipped: bool

@@ -7,6 +7,7 @@ from typing import Any
 from bt_tamp.bench.control import PARTS, Cost, middle
 from bt_tamp.bench.drag import DragResult
 from bt_tamp.bench.slide import SlideResult
+from bt_tamp.bench.tamp import CPU_WANTED, TampResult
 from bt_tamp.bench.wipe import WipeResult
 from sim.robot import GRAVITY
 
@@ -78,10 +79,29 @@ def plot_costs(folder: Path, runs: Sequence[Sequence[Cost]]) -> list[Path]:
     return [_saved(figure, folder / "control.png")]
 
 
+def plot_tables(folder: Path, results: Sequence[TampResult]) -> list[Path]:
+    """CPU of planning by the number of objects, and the plans' lengths by the shortest known."""
+    figure, (above, below) = _figure(2, sharex=True)
+    colors = {"fig1": "C0", "table": "C2", "larger": "C1", "unsolvable": "C3"}
+    for part, color in colors.items():
+        mine = [r for r in results if r.case.part == part]
+        above.scatter([r.case.objects for r in mine], [r.cpu_s for r in mine], color=color, label=part, s=14)
+        known = [r for r in mine if r.shortest]
+        below.scatter([r.case.objects for r in known], [r.steps / r.shortest for r in known], color=color, s=14)
+    above.axhline(CPU_WANTED, color="black", linewidth=0.5, linestyle="--")
+    above.set_yscale("log")
+    above.set_ylabel("CPU of planning, s")
+    above.legend(loc="upper left")
+    below.set_ylabel("steps by the shortest known")
+    below.set_xlabel("objects")
+    return [_saved(figure, folder / "tamp.png")]
+
+
 PLOTS: Mapping[str, Callable[[Path, Sequence[Any]], list[Path]]] = {
     "force": plot_forces,
     "wipe": plot_wipes,
     "drag": plot_drags,
+    "tamp": plot_tables,
     "control": plot_costs,
 }
 """By benchmark. Each returns the PNG files it made, and raises ImportError without matplotlib."""

@@ -1,6 +1,8 @@
-"""Measure how well contact is controlled and what control costs. A table closes, and the figures to reach.
+"""Measure how well contact is controlled, what control costs, and how fast tables are planned. A table closes, and the
+figures to reach.
 
-The exit code is 0 when everything was measured, whatever came of it: the last section tells that.
+The exit code is 0 when everything was measured, whatever came of it: the last section tells that. What was measured
+before an interruption is told too.
 """
 
 import argparse
@@ -21,6 +23,7 @@ BENCHES = {
     "force": "slides at 0.1 m/s: laws side by side, then every disturbance alone and all together",
     "wipe": "random crumbs, the dustpan on each side of the table in turn: how many lie in it in the end",
     "drag": "random flat boxes: how many are dragged to an edge of their table and picked there",
+    "tamp": "fig1 and random tables: planning time and plan length, and what is said of those that can't be cleared",
     "control": "cost of a control tick by part beside the bare physics step, and the real-time factor",
 }
 
@@ -46,8 +49,20 @@ def call(arguments: argparse.Namespace) -> int:
     from bt_tamp.bench.checks import print_checks, write_json
 
     planned = bench.planned(arguments.quick)
+    results: list[Any] = []
+    interruption: KeyboardInterrupt | None = None
     with _progress(bench.WHAT, len(planned)) as advance:
-        results = bench.measure(planned, lambda result: advance(bench.said(result)))
+
+        def done(result: Any) -> None:
+            results.append(result)
+            advance(bench.said(result))
+
+        try:
+            bench.measure(planned, done)
+        except KeyboardInterrupt as stopped:
+            if not results:
+                raise
+            interruption = stopped
     console = Console()
     bench.print_results(console, results)
     checks = bench.acceptance(results)
@@ -55,6 +70,8 @@ def call(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         write_json(arguments.out / f"{arguments.bench}.json", checks, **{bench.WHAT: bench.records(results)})
         _plot(arguments.bench, arguments.out, results)
+    if interruption is not None:
+        raise interruption
     return 0
 
 
