@@ -1,4 +1,4 @@
-"""Shares out what a task plan puts away among places that are as good as each other, so that none is crowded for nothing.
+"""Shares out what a plan puts away among places that are as good as each other, so that none is crowded for nothing.
 
 To the task planner one bin is like another, and it fills the first. What is refined is a plan of the same length that
 puts each thing where the fewest lie.

@@ -1,4 +1,4 @@
-"""What a body stands on, besides a surface: other bodies, and fixed things."""
+"""What a body stands on, besides a surface: other bodies, and fixed things; and what stands on it."""
 
 from functools import lru_cache
 
@@ -18,6 +18,17 @@ def supports(scene: SceneState, name: str) -> frozenset[str]:
     if name not in scene.poses or (scene.held is not None and scene.held.name == name):
         return frozenset()
     return _supports(Standing(scene), name)
+
+
+def burden(scene: SceneState, name: str) -> frozenset[str]:
+    """Bodies that stand on a body, or on what stands on it."""
+    found = frozenset({name})
+    for _ in scene.poses:
+        more = found | {other for other in scene.poses if supports(scene, other) & found}
+        if more == found:
+            break
+        found = more
+    return found - {name}
 
 
 @lru_cache(maxsize=512)

@@ -16,7 +16,7 @@ from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
 from skills.pick import Pick
 from skills.pressing import Pressing, in_order
-from skills.skill import Toolkit, Unfit, beyond_reach, refine_by_sampling
+from skills.skill import Toolkit, Unfit, beyond_reach, laden, refine_by_sampling
 from skills.towing import (
     EDGE_MARGIN,
     Tips,
@@ -210,6 +210,9 @@ class _Search:
         X_WO_end = pull.end.pose(body, X_WO, table)
         if not self._fits(body, X_WO, X_WO_end, pull.tips):
             return Unfit("the fingertips would not stay on it, above the table")
+        on_it = laden(self.action, world)
+        if on_it is not None:
+            return on_it
         wall = fixed_in_way(world.scenario, body, X_WO, X_WO_end)
         if wall is not None:
             self._hopeless.add(pull.end)

@@ -15,7 +15,7 @@ from scenarios.shapes import bounds
 from sim.scene import Held, SceneState
 from skills.context import ActionRun, SkillContext
 from skills.pressing import Pressing, in_order
-from skills.skill import Toolkit, Unfit, beyond_reach, hand_would_hit, refine_by_sampling
+from skills.skill import Toolkit, Unfit, beyond_reach, hand_would_hit, laden, refine_by_sampling
 from skills.towing import (
     Tips,
     footprint,
@@ -134,7 +134,7 @@ class DragAside:
         X_WG = press_pose(scene.scenario.bodies[name], X_WO_end, X_WO_end.translation - X_WO.translation, shift.tips)
         there = replace(scene, opening=0.0, held=Held(name, X_WG.actInv(X_WO_end)))
         sliding = pairs(robot.finger_links, name) | pairs(name, surface)
-        unfit = hand_would_hit(self._kit, there, X_WG, sliding, GAP)
+        unfit = laden(action, scene) or hand_would_hit(self._kit, there, X_WG, sliding, GAP)
         return unfit or tow(self._kit, action, scene, X_WO_end, shift.tips, shift.pressing)
 
 

@@ -19,7 +19,18 @@ from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Close, Follow, guarded, sequence
 from skills.refine import Refine
-from skills.skill import Legs, Line, Toolkit, Unfit, Way, beyond_reach, find_way, hand_would_hit, refine_by_sampling
+from skills.skill import (
+    Legs,
+    Line,
+    Toolkit,
+    Unfit,
+    Way,
+    beyond_reach,
+    find_way,
+    hand_would_hit,
+    laden,
+    refine_by_sampling,
+)
 from skills.waypoints import back_off, raised
 from skills.weigh import Weigh
 
@@ -115,7 +126,7 @@ class Pick:
         ready = replace(scene, opening=opening)
         X_WG = scene.poses[name] * grasp.X_OG
         touching = pairs(robot.finger_links, name)
-        unfit = hand_would_hit(self._kit, ready, X_WG, touching)
+        unfit = laden(action, scene) or hand_would_hit(self._kit, ready, X_WG, touching)
         if unfit:
             return unfit
 

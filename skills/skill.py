@@ -16,6 +16,7 @@ from planner.failure import Blocked, MotionFailure, RefinementFailure
 from planner.motion.motion_planner import MotionPlanner
 from planner.motion.trajectory import Trajectory
 from planner.refinement import Budget, Hints, Pair, Phase, Refinement, Refiner
+from planner.support import burden
 from planner.task.symbols import GroundAction
 from scenarios.shapes import bounding_radius
 from sim.robot import RobotModel
@@ -71,7 +72,7 @@ class Toolkit:
 
 @dataclass(frozen=True)
 class Unfit:
-    """A sample refused by a cheap look, before any motion was sought. All of the culprits have to go before it works."""
+    """A sample refused by a cheap look, before any motion was sought. All of the culprits have to go."""
 
     reason: str
     culprits: frozenset[str] = frozenset()
@@ -172,6 +173,12 @@ def hand_would_hit(
         return None
     movable = hits & frozenset(scene.poses)
     return Unfit("the hand would hit " + ", ".join(sorted(hits)), movable if movable == hits else frozenset())
+
+
+def laden(action: GroundAction, scene: SceneState) -> Unfit | None:
+    """What stands on the action's object and would have to go before it is moved."""
+    on_it = burden(scene, action.args[0])
+    return Unfit(f"{', '.join(sorted(on_it))} would come along", on_it) if on_it else None
 
 
 Attempt = Callable[[Any, SceneState], "tuple[Phase, ...] | MotionFailure | Unfit"]
