@@ -53,12 +53,13 @@ class Stuck:
 
 @dataclass
 class _Pending:
-    """The deepest failure so far, and the choices (depths) to go back to, the latest first."""
+    """The deepest failure so far, the choices (depths) to go back to, the latest first, and those already revised."""
 
     depth: int
     stuck: Stuck
     targets: list[int]
     failures: list[RefinementFailure] = field(default_factory=list)
+    revised: set[int] = field(default_factory=set)
 
 
 class PlanRefiner:
@@ -110,6 +111,7 @@ class PlanRefiner:
                 return replace(pending.stuck, failure=_merged(pending))
             left -= 1
             back = pending.targets[0]
+            pending.revised.add(back)
             self._report("backtracked", {"action": str(step.action), "to": str(chosen[back].step.action)})
             avoid = {d: samples for d, samples in avoid.items() if d <= back}
             avoid.setdefault(back, set()).add(chosen[back].refinement.sample)
@@ -164,15 +166,18 @@ def _targets(failure: RefinementFailure, situation: Situation, chosen: list[Chos
 def _updated(pending: _Pending | None, depth: int, stuck: Stuck, targets: list[int]) -> _Pending:
     """The pending failure after one more.
 
-    One farther on replaces it. One at the same step adds to it. One before it only means that the
-    choice gone back to, or the step between, has nothing else to offer.
+    One farther on replaces it. One at the same step adds to it; when other bodies are in its way again, what was
+    revised without effect is not revised another time. One before it only means that the choice gone back to, or the
+    step between, has nothing else to offer.
     """
     if pending is None or depth > pending.depth:
         return _Pending(depth, stuck, targets, [stuck.failure])
     remaining = {target for target in pending.targets if target < depth}
     if depth < pending.depth:
         return replace(pending, targets=sorted(remaining.union({depth}.intersection(targets)), reverse=True))
-    return _Pending(depth, stuck, sorted(remaining.union(targets), reverse=True), [*pending.failures, stuck.failure])
+    spent = pending.revised if stuck.failure.culprit_sets else set()
+    targets = sorted(remaining.union(targets) - spent, reverse=True)
+    return replace(pending, stuck=stuck, targets=targets, failures=[*pending.failures, stuck.failure])
 
 
 def _merged(pending: _Pending) -> RefinementFailure:

@@ -45,7 +45,9 @@ def surfaces(scene: SceneState, place: str) -> list[Surface]:
     if isinstance(where, Region):
         bodies = [scene.scenario.bodies[name] for name in sorted(scene.poses) if place_of(scene, name) == place]
         tops = [top_of(body.shape, scene.poses[body.name]) for body in bodies]
-        found += [top for top in tops if top is not None]
+        rim = float(found[0].X_WS.translation[2]) + found[0].wall
+        # What lies in a container has its centre below the rim.
+        found += [top for top in tops if top is not None and float(top.X_WS.translation[2]) < rim]
     return found
 
 
