@@ -4,7 +4,7 @@ Where an action fails because of a pose or grasp that the plan itself chose earl
 back to that choice, a bounded number of times, before the failure is held against the plan.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -96,7 +96,8 @@ class PlanRefiner:
                     continue
                 failure, targets = _spoiled(outcome, step.adds - after.facts), [depth]
             else:
-                failure, targets = outcome, _targets(outcome, situation, chosen)
+                revised = pending.revised if pending is not None and pending.depth == depth else set[int]()
+                failure, targets = outcome, _targets(outcome, situation, chosen, revised)
             self._report(
                 "refinement_failed",
                 {
@@ -146,11 +147,13 @@ def _spoiled(refinement: Refinement, missing: frozenset[Fact]) -> RefinementFail
     return RefinementFailure(refinement.action, reason, (Blocked(refinement.sample, reason),))
 
 
-def _targets(failure: RefinementFailure, situation: Situation, chosen: list[Chosen]) -> list[int]:
+def _targets(
+    failure: RefinementFailure, situation: Situation, chosen: list[Chosen], revised: Collection[int]
+) -> list[int]:
     """Depths of the choices that the failure depends on, the latest first.
 
     They are those that brought the object and the culprits where they are; without culprits, the
-    grasp on what the hand holds as well.
+    grasp on what the hand holds as well. With culprits, what brought the object there is revised once at most.
     """
     if failure.proof == "anywhere":
         return []
@@ -160,23 +163,24 @@ def _targets(failure: RefinementFailure, situation: Situation, chosen: list[Chos
         bodies.add(situation.held.body)
     movers = {situation.movers[body] for body in bodies if body in situation.movers}
     latest = {entry.step.action: depth for depth, entry in enumerate(chosen)}
+    own = situation.movers.get(failure.action.args[0])
+    if culprits and own is not None and latest[own] in revised:
+        movers.discard(own)
     return sorted((latest[action] for action in movers), reverse=True)
 
 
 def _updated(pending: _Pending | None, depth: int, stuck: Stuck, targets: list[int]) -> _Pending:
     """The pending failure after one more.
 
-    One farther on replaces it. One at the same step adds to it; when other bodies are in its way again, what was
-    revised without effect is not revised another time. One before it only means that the choice gone back to, or the
-    step between, has nothing else to offer.
+    One farther on replaces it. One at the same step adds to it. One before it only means that the
+    choice gone back to, or the step between, has nothing else to offer.
     """
     if pending is None or depth > pending.depth:
         return _Pending(depth, stuck, targets, [stuck.failure])
     remaining = {target for target in pending.targets if target < depth}
     if depth < pending.depth:
         return replace(pending, targets=sorted(remaining.union({depth}.intersection(targets)), reverse=True))
-    spent = pending.revised if stuck.failure.culprit_sets else set()
-    targets = sorted(remaining.union(targets) - spent, reverse=True)
+    targets = sorted((remaining - pending.revised).union(targets), reverse=True)
     return replace(pending, stuck=stuck, targets=targets, failures=[*pending.failures, stuck.failure])
 
 

@@ -18,7 +18,7 @@ from scenarios.document import parse_document
 from scenarios.errors import SceneInvalid
 from scenarios.groups import beside, crumbs, flat, flat_under, lone, stack
 from scenarios.load import build_scenario
-from scenarios.spoilers import KINDS, Spoiler, spoiler
+from scenarios.spoilers import KINDS, ROOM, Spoiler, spoiler
 from scenarios.wares import Ware, box, number
 
 MOST_OBJECTS = 24
@@ -82,7 +82,7 @@ def _attempt(rng: np.random.Generator, seed: int, objects: int, unsolvable: str 
     spoiling = None if unsolvable is None else spoiler(unsolvable, rng)
     plan = Plan(rng, objects, "plain" if spoiling else table_kind(seed), seed // 10 + 2 * seed, side)
     groups = _groups(plan, spoiling)
-    room = Room((0.42, 0.82, -0.26, 0.38))
+    room = Room(spoiling.room if spoiling else ROOM)
     pan = float(rng.uniform(0.63, 0.67))
     if any(piece.goes == "dustpan" for group in groups for piece in group.pieces):
         # The sponge's lane, and the space behind the last crumb from which it comes.

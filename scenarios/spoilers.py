@@ -15,17 +15,23 @@ KINDS = ("goal-too-small", "crumb-behind-wall", "out-of-reach", "too-heavy", "fl
 RIM = 0.012
 """Thickness in metres of fixed walls."""
 
+ROOM = (0.42, 0.82, -0.26, 0.38)
+BEHIND_WALL = (0.42, 0.82, -0.23, 0.38)
+"""Where groups may stand on a table: lowest and highest x and y in metres, and the same where a wall stands across."""
+
 
 @dataclass(frozen=True)
 class Spoiler:
     """The group that can't be cleared (None: it is added by `change`), and what else becomes of the scene's data.
 
-    change(data, side): `side` is +1, or −1 for a table mirrored in y.
+    change(data, side): `side` is +1, or −1 for a table mirrored in y. room: where groups may stand, so that all but one
+    thing can be cleared.
     """
 
     group: Group | None
     change: Callable[[dict[str, Any], float], None]
     may_have_crumbs: bool = True
+    room: tuple[float, float, float, float] = ROOM
 
 
 def spoiler(kind: str, rng: np.random.Generator) -> Spoiler:
@@ -34,7 +40,7 @@ def spoiler(kind: str, rng: np.random.Generator) -> Spoiler:
         case "goal-too-small":
             return _goal_too_small(rng)
         case "crumb-behind-wall":
-            return Spoiler(crumbs(rng, "1", 1), _wall_across, may_have_crumbs=False)
+            return Spoiler(crumbs(rng, "1", 1), _wall_across, may_have_crumbs=False, room=BEHIND_WALL)
         case "out-of-reach":
             return _out_of_reach(rng)
         case "too-heavy":
