@@ -240,15 +240,15 @@ def _culprits(
 ) -> frozenset[str]:
     """Movable bodies without which the sample works and which its motion then would hit; empty if it doesn't.
 
-    The action's own objects are none: without them there is nothing to do. Where a cheap look alone tells that one of
-    the `known` sets has to go and more, that is all that is found out.
+    The action's own objects are none: without them there is nothing to do. What can't become anything but one of the
+    `known` sets or more, the latter where a cheap look alone tells so, is not looked into.
     """
     own = frozenset(action.args)
     if not outcome.culprits or outcome.culprits & own:
         return frozenset()
     suspects, is_sure = outcome.culprits, isinstance(outcome, Unfit)
     for _ in range(len(scene.poses)):
-        if is_sure and any(culprits <= suspects for culprits in known):
+        if (is_sure and any(culprits <= suspects for culprits in known)) or (len(suspects) == 1 and suspects in known):
             return suspects
         again = attempt(sample, scene.without(suspects))
         if isinstance(again, tuple):

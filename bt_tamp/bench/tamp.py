@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from bt_tamp.bench.checks import Check
 from bt_tamp.bench.tables import CULPRITS, LARGER, MOST, Case, cases
@@ -150,41 +149,36 @@ def _of(results: Sequence[TampResult], part: str) -> list[TampResult]:
     return [result for result in results if result.case.part == part]
 
 
+COLUMNS = (
+    ("", 5, lambda rs: str(len(rs))),
+    ("planned", 8, lambda rs: _count(r.is_planned for r in rs)),
+    ("cleared", 8, lambda rs: _count(r.outcome == "goal_reached" for r in rs)),
+    ("proven", 7, lambda rs: _count(r.outcome == "proven" for r in rs)),
+    ("budget", 7, lambda rs: _count(r.outcome == "budget" for r in rs)),
+    ("culprit", 8, lambda rs: _count(r.case.kind is not None and r.is_told for r in rs)),
+    ("median", 8, lambda rs: f"{statistics.median(r.cpu_s for r in rs):.2f}"),
+    ("p95", 7, lambda rs: f"{np.percentile([r.cpu_s for r in rs], 95):.2f}"),
+    ("max", 7, lambda rs: f"{max(r.cpu_s for r in rs):.2f}"),
+    ("rounds", 7, lambda rs: f"{statistics.mean(r.rounds for r in rs):.1f}"),
+    ("length", 7, lambda rs: f"{max((r.steps / r.shortest for r in rs if r.shortest), default=0.0):.2f}"),
+)
+"""Heading, width and text of each column, for the results of a group."""
+
+NOTES = """\
+planned: within 20 s of CPU. proven, budget: why there is no plan. culprit: nothing but the one thing that can't be
+cleared is named. median, p95, max: CPU seconds of planning. rounds: mean. length: steps by the fewest known, worst."""
+
+
+def _count(those: Iterable[bool]) -> str:
+    return str(sum(those) or "–")
+
+
 def print_results(console: Console, results: Sequence[TampResult]) -> None:
     """One row a group of tables, then every table that fell short."""
-    table = Table(
-        caption="planned: within 20 s of CPU. culprit: nothing but the one thing that can't be cleared is named.",
-        caption_justify="left",
-    )
-    for heading in ("tables", "", "planned", "cleared", "proven", "budget", "culprit", "median s", "p95 s", "max s"):
-        table.add_column(heading, justify="left" if heading == "tables" else "right")
-    for heading in ("rounds", "steps by shortest"):
-        table.add_column(heading, justify="right")
+    lines = [f"{'tables':28}" + "".join(f"{name:>{width}}" for name, width, _ in COLUMNS)]
     for group in groups(results):
-        table.add_row(group.title, *_row(group.results))
-    console.print(table)
-    for line in shortcomings(results):
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
-
-
-def _row(results: Sequence[TampResult]) -> list[str]:
-    outcomes = [result.outcome for result in results]
-    told = sum(r.is_told for r in results if r.case.part == "unsolvable")
-    counts = (
-        sum(result.is_planned for result in results),
-        *(outcomes.count(name) for name in ("goal_reached", "proven", "budget")),
-        told,
-    )
-    cpu = [result.cpu_s for result in results]
-    ratios = [r.steps / r.shortest for r in results if r.shortest]
-    figures = statistics.median(cpu), float(np.percentile(cpu, 95)), max(cpu)
-    return [
-        str(len(results)),
-        *(str(count or "") for count in counts),
-        *(f"{figure:.2f}" for figure in figures),
-        f"{statistics.mean(result.rounds for result in results):.1f}",
-        f"{statistics.mean(ratios):.3f} (≤ {max(ratios):.2f})" if ratios else "",
-    ]
+        lines.append(f"{group.title:28}" + "".join(f"{text(group.results):>{width}}" for _, width, text in COLUMNS))
+    console.print("\n".join([*lines, NOTES, *shortcomings(results)]), highlight=False, markup=False, soft_wrap=True)
 
 
 def shortcomings(results: Sequence[TampResult]) -> list[str]:

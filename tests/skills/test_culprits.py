@@ -48,6 +48,13 @@ def test_what_needs_more_than_another_sample_is_not_looked_into():
     assert trials.count == len(samples) + 1, "only the first one was tried again without the box"
 
 
+@pytest.mark.parametrize("refusal", [Unfit, MotionFailure])
+def test_what_hits_the_same_one_body_is_not_looked_into(refusal):
+    trials = Trials({n: {"box"} for n in range(10)}, refusal)
+    assert blamed(trials.refine()) == {n: {"box"} for n in range(10)}
+    assert trials.count == 11
+
+
 def test_a_sample_that_was_to_be_tried_first_is_looked_into_whatever_is_known():
     trials = Trials({0: {"box"}, 1: {"box", "carrot"}}, Unfit)
     outcome = trials.refine(Hints(first=(0, 1)))
