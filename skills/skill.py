@@ -207,7 +207,7 @@ def refine_by_sampling(
         outcome = attempt(sample, scene)
         if isinstance(outcome, tuple):
             return Refinement(action, sample, outcome)
-        known = [entry.culprits for entry in attempts if entry.culprits] if sample not in hints.first else []
+        known = [entry.culprits for entry in attempts if entry.culprits]
         blocked = Blocked(sample, outcome.reason, _culprits(action, sample, scene, attempt, outcome, known))
         reasons[blocked.reason] = reasons.get(blocked.reason, 0) + 1
         if isinstance(outcome, Unfit) and not blocked.culprits:

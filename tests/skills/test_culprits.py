@@ -25,9 +25,9 @@ class Trials:
         hits = frozenset(self._in_the_way[sample]) & frozenset(scene.poses)
         return self._refusal("something is hit", hits) if hits else ()
 
-    def refine(self, hints=None):
+    def refine(self):
         samples = list(self._in_the_way)
-        return refine_by_sampling(PICK, SCENE, samples, self, Budget(tries=len(samples)), hints or Hints())
+        return refine_by_sampling(PICK, SCENE, samples, self, Budget(tries=len(samples)), Hints())
 
 
 def blamed(outcome):
@@ -53,13 +53,6 @@ def test_what_hits_the_same_one_body_is_not_looked_into(refusal):
     trials = Trials({n: {"box"} for n in range(10)}, refusal)
     assert blamed(trials.refine()) == {n: {"box"} for n in range(10)}
     assert trials.count == 11
-
-
-def test_a_sample_that_was_to_be_tried_first_is_looked_into_whatever_is_known():
-    trials = Trials({0: {"box"}, 1: {"box", "carrot"}}, Unfit)
-    outcome = trials.refine(Hints(first=(0, 1)))
-    assert blamed(outcome)[1] == {"box", "carrot"}
-    assert trials.count == 4
 
 
 def test_of_what_a_motion_hits_only_those_count_without_which_there_is_one():
