@@ -77,7 +77,8 @@ class SkillContext:
     """Shared by all leaves; the executive brings `observation` and `scene` up to date before each tick of the tree.
 
     refine: an action's motion in the present scene, and the simulated seconds that finding it costs.
-    phase, allowed: what runs now, and the contacts it declares.
+    phase, allowed: what runs now, and the contacts it declares. is_watchful: motions are watched while they run, and
+    actions worked out again where they start; else they are carried out as planned, whatever is seen.
     """
 
     robot: RobotModel
@@ -87,6 +88,7 @@ class SkillContext:
     scene: SceneState
     refine: Callable[[GroundAction], tuple[Refinement | RefinementFailure, float]]
     contact_mode: Mode = "hybrid"
+    is_watchful: bool = True
     report: Callable[..., None] = _ignore
     failure: Failure | None = None
     phase: Phase | None = None

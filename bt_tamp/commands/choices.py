@@ -39,6 +39,25 @@ def add_planning(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--problem", type=Path, metavar="FILE", help="hand-written PDDL problem, with --domain")
 
 
+def add_disturbances(parser: argparse.ArgumentParser) -> None:
+    """What befalls a run, and whether it watches."""
+    from bt_tamp.disturb.names import CLASSES
+
+    group = parser.add_argument_group("disturbances")
+    group.add_argument(
+        "--disturb",
+        default="none",
+        metavar="CLASS,…",
+        help=f"classes of disturbances, all or none (default); {', '.join(CLASSES)}",
+    )
+    group.add_argument(
+        "--no-replan",
+        dest="replan",
+        action="store_false",
+        help="the open-loop baseline: the first plan is carried out blindly, and a failure ends the run",
+    )
+
+
 def add_time_limit(parser: argparse.ArgumentParser) -> None:
     """When to give up."""
     parser.add_argument(
@@ -51,8 +70,13 @@ def options_of(arguments: argparse.Namespace, window: bool = False) -> "RunOptio
     from bt_tamp.errors import refusing
     from bt_tamp.options import RunOptions
 
-    names = "seed contact preset search tries motion_planner domain problem max_sim_time".split()
+    names = "seed contact preset search tries motion_planner domain problem replan max_sim_time".split()
     given = {name: getattr(arguments, name) for name in names if hasattr(arguments, name)}
+    if hasattr(arguments, "disturb"):
+        from bt_tamp.disturb.names import chosen
+
+        with refusing(ValueError, about="--disturb"):
+            given["disturb"] = chosen(arguments.disturb)
     with refusing(ValueError):
         options = RunOptions(**given, window=window)
     _check_names(options)

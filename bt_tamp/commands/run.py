@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_tamp.commands.choices import add_planning, add_scene, add_time_limit, options_of, scenario_of
+from bt_tamp.commands.choices import add_disturbances, add_planning, add_scene, add_time_limit, options_of, scenario_of
 from bt_tamp.commands.stopping import stop_on_signals
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="the run's folder (default: runs/SCENE-SEED[-n])")
     parser.add_argument("--force", action="store_true", help="replace a run that lies in the folder already")
+    add_disturbances(parser)
     add_time_limit(parser)
     add_planning(parser)
 
@@ -39,10 +40,12 @@ def call(arguments: argparse.Namespace) -> int:
     from bt_tamp.quiet import outliving_a_closed_pipe, quiet_imports
 
     with quiet_imports():
+        from bt_tamp.disturb.classes import amended
         from bt_tamp.executive.loop import run_scenario
     from bt_tamp.report.live import watcher
     from bt_tamp.report.recorder import RunRecorder
 
+    scenario = amended(scenario, options.disturb)
     with RunRecorder(scenario, folder, watcher(sys.stdout)) as recorder:
         result = run_scenario(scenario, options, recorder)
     video = None
@@ -89,4 +92,6 @@ def _listed(names: list[str]) -> str:
 def _where(place: str, are_many: bool) -> str:
     if place == "hand":
         return "still in the hand"
+    if place == "nowhere":
+        return f"{'are' if are_many else 'is'} nowhere to be seen"
     return f"{'lie' if are_many else 'lies'} {'on the' if place in ('table', 'floor') else 'in'} {place}"

@@ -8,23 +8,21 @@ from pinocchio import SE3
 from scenarios.scenario import Body, RobotPlacement, Scenario, Table
 from scenarios.shapes import Box
 from sim.bullet import BulletPlant
-from sim.disturbance import (
-    DisturbedPlant,
-    Fault,
+from sim.disturbance import DisturbedPlant, Fault
+from sim.plant import Command, GripCommand
+from sim.robot import RobotModel
+from sim.robot_faults import JointFriction, Push
+from sim.sensor_faults import (
     ForceBias,
     ForceDelay,
     ForceFrozen,
     ForceMissing,
     ForceNoise,
     JointDelay,
-    JointFriction,
     PoseDelay,
     PoseMissing,
     PoseNoise,
-    Push,
 )
-from sim.plant import Command, GripCommand
-from sim.robot import RobotModel
 
 IDLE = GripCommand(0.0, 80.0)
 HOME = np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 80.0, 0.0])
@@ -185,7 +183,7 @@ def test_a_push_on_the_elbow_turns_the_shoulder(make):
 
 
 def test_what_is_no_fault_of_sensors_or_world_is_refused(make):
-    with pytest.raises(TypeError, match="neither a fault of sensors nor of the world"):
+    with pytest.raises(TypeError, match="neither a fault of sensors, of commands nor of the world"):
         make(Fault())
 
 
