@@ -17,8 +17,8 @@ from bt_tamp.sweep_store import Row
 
 @dataclass(frozen=True)
 class Summary:
-    """One scene's runs with the same disturbances: how many, how many reached the goal, medians (None without a finished run), contacts that no
-    phase had declared, and what failed as (seed, reason)."""
+    """One scene's runs with the same disturbances: how many, how many reached the goal, medians (None without a
+    finished run), contacts that no phase had declared, and what failed as (seed, reason)."""
 
     scene: str
     disturb: tuple[str, ...]
