@@ -275,6 +275,11 @@ class BulletPlant:
             physicsClientId=self._client,
         )
 
+    def set_opening(self, opening: float) -> None:
+        """Put the fingers `opening` metres apart at once: a run that goes on begins with what its hand was like."""
+        for finger in self._finger_joints:
+            p.resetJointState(self._robot, finger, opening / 2, physicsClientId=self._client)
+
     def scale_masses(self, factor: float) -> None:
         """Make every moving link of the robot `factor` times as heavy as its model says, inertia included."""
         for link in range(p.getNumJoints(self._robot, physicsClientId=self._client)):

@@ -30,6 +30,11 @@ class GripDriver:
         """Are the fingers told to press?"""
         return self._target is None
 
+    @property
+    def force(self) -> float:
+        """Newtons with which each finger presses, 0 unless told to."""
+        return self._force if self.is_closing else 0.0
+
     def open_to(self, opening: float) -> None:
         """Bring the fingers `opening` metres apart and keep them there."""
         self._target = min(max(float(opening), 0.0), self._gripper.stroke)

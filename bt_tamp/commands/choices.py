@@ -9,9 +9,14 @@ if TYPE_CHECKING:
     from scenarios.scenario import Scenario
 
 
-def add_scene(parser: argparse.ArgumentParser) -> None:
+def add_scene(parser: argparse.ArgumentParser, is_optional: bool = False) -> None:
     """The scene and its seed."""
-    parser.add_argument("scene", metavar="SCENE", help="a shipped scene's name (bt-tamp list) or a scene file")
+    parser.add_argument(
+        "scene",
+        metavar="SCENE",
+        nargs="?" if is_optional else None,
+        help="a shipped scene's name (bt-tamp list) or a scene file",
+    )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="0 (default): the nominal scene; else noise drawn from N"
     )

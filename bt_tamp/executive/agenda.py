@@ -18,7 +18,8 @@ from skills.skill import Skill
 class Agenda:
     """What is to be done, and how far it has come.
 
-    `goal` is what is wanted, `late` bodies not counted before they were seen. Without `is_watchful` the first plan is
+    `goal` is what is wanted; `late` bodies are not counted before they were seen (`order` is all that was asked for,
+    `unseen` those of them that are still to come). Without `is_watchful` the first plan is
     carried out whatever is seen, and nothing is skipped or done again. `facts` states a believed scene
     in the planner's predicates. `rebuilt` is called whenever `act` has new children, `done`
     with what was carried out to its effect.
@@ -43,22 +44,22 @@ class Agenda:
         self._skills = skills
         self._rebuilt = rebuilt
         self._done = done
-        self._order, self._unseen = goal, late
+        self.order, self.unseen = goal, late
         self._refinements: tuple[Refinement, ...] = ()
         self._running = 0
 
     @property
     def goal(self) -> frozenset[Fact]:
         """What is wanted now."""
-        return frozenset(fact for fact in self._order if self._unseen.isdisjoint(fact.args))
+        return frozenset(fact for fact in self.order if self.unseen.isdisjoint(fact.args))
 
     def want(self, goal: frozenset[Fact]) -> None:
         """Somebody wants something else from now on."""
-        self._order = goal
+        self.order = goal
 
     def look_out(self, scene: SceneState) -> None:
         """What comes late is asked for as soon as it is there."""
-        self._unseen = self._unseen - scene.poses.keys()
+        self.unseen = self.unseen - scene.poses.keys()
 
     def pursued(self, scene: SceneState) -> frozenset[Fact]:
         """The part of the goal that can be worked on: what it is about is to be seen."""
@@ -67,7 +68,7 @@ class Agenda:
 
     def missing(self, scene: SceneState) -> tuple[str, ...]:
         """Bodies that should be there and are nowhere to be seen."""
-        return tuple(name for name in scene.scenario.bodies if name not in scene.poses and name not in self._unseen)
+        return tuple(name for name in scene.scenario.bodies if name not in scene.poses and name not in self.unseen)
 
     @property
     def refinements(self) -> tuple[Refinement, ...]:

@@ -17,6 +17,7 @@ from bt_tamp.executive.befallen import Ledger
 from bt_tamp.executive.build import CONTROL_EVERY, TREE_EVERY, Machine, build
 from bt_tamp.executive.force_audit import ForceAudit
 from bt_tamp.executive.plan_node import LOST_PATIENCE
+from bt_tamp.executive.resuming import entering, state_of, take_up
 from bt_tamp.executive.seams import REAL
 from bt_tamp.export.snapshot import Results
 from bt_tamp.options import RunOptions
@@ -24,6 +25,7 @@ from bt_tamp.report.recorder import RunRecorder
 from bt_tamp.report.result import Outcome, RunResult
 from bt_tamp.report.sentences import counted
 from bt_tamp.report.signals import Contact, Reference
+from bt_tamp.report.state import RunState
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
 from sim.disturbance import DisturbedPlant
@@ -31,6 +33,9 @@ from sim.plant import Command
 
 SAMPLE_EVERY = 5
 """Control ticks between two samples of the signals and two looks at the true contacts: 100 Hz."""
+
+BRAKING = 2.0
+"""Simulated seconds that the arm gets to come to rest after an interruption."""
 
 BLIND_PATIENCE = 3.0
 """Simulated seconds that things get to come to rest once a plan was carried out blindly."""
@@ -78,9 +83,11 @@ class Ending:
     reason: str
 
 
-def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder) -> RunResult:
-    """Plan and act until the goal is reached or given up. An interruption (Ctrl-C) or an error in our own code ends the
-    run with a result too.
+def run_scenario(
+    scenario: Scenario, options: RunOptions, recorder: RunRecorder, start: RunState | None = None
+) -> RunResult:
+    """Plan and act until the goal is reached or given up. An interruption (Ctrl-C) stops the arm softly; it, or an
+    error in our own code, ends the run with a result too. start: the state in which the scenario is entered, if not afresh.
 
     Raises PddlError for hand-written PDDL that doesn't fit, ValueError for options that don't.
     """
@@ -104,22 +111,25 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
     driver = None
     if options.disturb or scenario.disturbances:
         driver = Driver(scenario.disturbances, options.disturb, options.seed, report)
-    machine = build(scenario, options, report, tree_changed, driver.seams if driver else REAL)
+    seams = driver.seams if driver else REAL
+    machine = build(scenario, options, report, tree_changed, seams if start is None else entering(start, seams))
     if driver is not None:
         driver.bind(machine)
     audits = Audits.of(machine)
     report("run_started", scene=scenario.name, seed=scenario.seed)
     try:
+        if start is not None:
+            take_up(machine, start)
         ending = _run(machine, options, recorder, audits, tally)
     except KeyboardInterrupt:
-        ending = Ending("interrupted", "the run was interrupted")
+        ending = Ending("interrupted", _brake(machine, recorder, audits, tally))
     except Exception as error:  # Whatever it is: the run's folder is worth most when something went wrong.
         ending = Ending("crashed", f"{type(error).__name__}: {one_line_of(error)}")
         recorder.crash(traceback.format_exc())
     result = _result(machine, scenario, ending, audits, tally)
     recorder.tree(machine.mission.root, "end", tally.results)
     report("run_ended", outcome=result.outcome, sentence=result.reason)
-    recorder.finish(result)
+    recorder.finish(result, state_of(machine))
     machine.plant.close()
     return result
 
@@ -140,6 +150,22 @@ def _run(
                 return ending
         act(machine, recorder, audits, tally, n)
         n += 1
+
+
+def _brake(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally) -> str:
+    """Bring the arm to rest, for a bounded time; how that went, in a sentence. A second one ends it at once."""
+    try:
+        machine.agenda.act.stop(Status.INVALID)
+        machine.context.controller.hold()
+        for n in range(round(BRAKING / (CONTROL_EVERY * machine.plant.timestep))):
+            machine.context.observation = machine.plant.observe()
+            tally.t = machine.context.observation.t
+            act(machine, recorder, audits, tally, n)
+            if machine.context.controller.finished:
+                return "the run was interrupted, the arm brought to rest"
+    except KeyboardInterrupt:
+        return "the run was interrupted twice, and ended at once"
+    return f"the run was interrupted, and the arm did not come to rest within {BRAKING:g} s"
 
 
 def look(machine: Machine, tally: Tally, n: int) -> None:
