@@ -154,7 +154,7 @@ def _line(key: tuple[str, str, bool], runs: Sequence[Run], usual: Mapping[tuple,
         one.answered_after_s
         for result in results
         for one in result.disturbances
-        if one.answer in ("refined_again", "rebuilt") and one.answered_after_s is not None
+        if one.answer in ("refined_again", "rebuilt") and one.phase != "planning" and one.answered_after_s is not None
     ]
     failed = Counter(_why(run) for run in runs if not run.succeeded)
     return Line(

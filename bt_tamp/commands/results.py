@@ -47,9 +47,9 @@ def _print(found: "list[Line]", runs: "list[Run]") -> None:
     from bt_tamp.sweep_results import scene_name
 
     console = Console()
-    table = Table()
+    table = Table(pad_edge=False)
     table.add_column("scene")
-    table.add_column("class")
+    table.add_column("class", no_wrap=True)
     for heading in ("success", "95 %", "replans", "lost s", "answer s", "peak N", "unmet"):
         table.add_column(heading, justify="right")
     for line in found:

@@ -140,8 +140,8 @@ def slipping(now: Occasion) -> Deed | None:
     name = now.held
     if name is None:
         return None
-    fault = Slippery(start=now.t, end=now.t + 0.6, name=name, friction=0.03)
-    return Deed(f"{name} turned slippery in the hand", (fault,), names=(name,))
+    fault = Slippery(start=now.t, end=now.t + 1.0, name=name, friction=0.002)
+    return Deed(f"{name} turned slippery in the hand for 1 s", (fault,), names=(name,))
 
 
 def closes_on_nothing(now: Occasion) -> Deed | None:

@@ -87,7 +87,8 @@ def run_scenario(
     scenario: Scenario, options: RunOptions, recorder: RunRecorder, start: RunState | None = None
 ) -> RunResult:
     """Plan and act until the goal is reached or given up. An interruption (Ctrl-C) stops the arm softly; it, or an
-    error in our own code, ends the run with a result too. start: the state in which the scenario is entered, if not afresh.
+    error in our own code, ends the run with a result too. start: the state in which the scenario is entered, if not
+    afresh.
 
     Raises PddlError for hand-written PDDL that doesn't fit, ValueError for options that don't.
     """

@@ -28,7 +28,7 @@ CERTAIN = 4.0
 MEDIAN_STEP = 2.18
 """Median distance of two points with standard deviation 1 in each direction."""
 
-REMEMBERED = 2.0
+REMEMBERED = 1.5
 """Seconds for which something out of sight is believed to be where it was."""
 
 
