@@ -448,7 +448,7 @@ class _Converted(Mapping[str, T], Generic[T]):
         self._raw, self._convert = raw, convert
         self._known: dict[str, T] = {}
         if before is not None:
-            self._known = {name: known for name, known in before._known.items() if before._raw[name] == raw[name]}
+            self._known = {name: known for name, known in before._known.items() if before._raw[name] == raw.get(name)}
 
     def __getitem__(self, name: str) -> T:
         if name not in self._known:
