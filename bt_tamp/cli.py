@@ -26,6 +26,7 @@ COMMANDS = {
     "explain": "tell the story of a run",
     "render": "render the video of a run",
     "sweep": "run scenes over many seeds in parallel, and sum up",
+    "results": "sum up what sweeps have stored, by scene and class of disturbance",
     "bench": "measure how well contact is controlled, and what control costs",
 }
 

@@ -15,8 +15,9 @@ class RunOptions:
     seed: noise of the scene and every random choice. contact: how contact motions are controlled.
     search: name of the task planner's search. tries: samples per action in a refinement.
     motion_planner: name of the motion planner. domain, problem: hand-written PDDL files (both or
-    none). max_sim_time: simulated seconds after which the run gives up. window: open PyBullet's
-    window (only where there is a display).
+    none). disturb: names of the classes of disturbances that befall it, one instance each. replan: watch, and plan
+    again; else the first plan is carried out blindly, and a failure ends the run. max_sim_time: simulated seconds
+    after which the run gives up. window: open PyBullet's window (only where there is a display).
     """
 
     seed: int = 0
@@ -27,6 +28,8 @@ class RunOptions:
     motion_planner: str | None = None
     domain: Path | None = None
     problem: Path | None = None
+    disturb: tuple[str, ...] = ()
+    replan: bool = True
     max_sim_time: float = 900.0
     window: bool = False
 

@@ -2,14 +2,18 @@
 
 import re
 import signal
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from joblib.externals.loky import ProcessPoolExecutor
 from joblib.externals.loky.process_executor import BrokenProcessPool
 
 from bt_tamp.options import RunOptions
+
+MAX_TRIES = 2
+"""How often a run is tried, at most, whose process vanishes."""
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Variables that keep a process's libraries to one thread."""
@@ -27,13 +31,15 @@ class Job:
 
 @dataclass(frozen=True)
 class Finished:
-    """What became of a job. outcome: that of the run, or "crashed" (an error in our code), "killed" (its process
-    vanished), "wrong_input". result: `result.json` as text, None unless the run came to its end."""
+    """What became of a job, at its how-manieth try. outcome: that of the run, or "crashed" (an error in our code),
+    "killed" (its process vanished), "wrong_input". result: `result.json` as text, None unless the run came
+    to its end."""
 
     job: Job
     outcome: str
     reason: str
     result: str | None = None
+    tries: int = 1
 
 
 def run_jobs(
@@ -41,17 +47,21 @@ def run_jobs(
 ) -> Generator[Finished, None, None]:
     """Run the jobs, so many at a time, and yield each as it comes to its end. work: what runs a job (`run_job`).
 
-    Every process is an executor of its own, so that one that dies can be told from its neighbours.
+    Every process is an executor of its own, so that one that dies can be told from its neighbours. A job whose process
+    vanishes is tried MAX_TRIES times in all: one that kills it each time is recorded as such.
     Leaving the iterator early ends the processes.
     """
     work = run_job if work is None else work
     waiting = iter(jobs)
     idle = [_executor() for _ in range(processes)]
+    again: list[Job] = []
+    tries: Counter[Job] = Counter()
     running: dict[Future, tuple[Job, ProcessPoolExecutor]] = {}
     try:
         while True:
-            while idle and (job := next(waiting, None)) is not None:
+            while idle and (job := again.pop() if again else next(waiting, None)) is not None:
                 executor = idle.pop()
+                tries[job] += 1
                 running[executor.submit(work, job)] = (job, executor)
             if not running:
                 return
@@ -62,7 +72,10 @@ def run_jobs(
                     executor.shutdown(wait=False, kill_workers=True)
                     executor = _executor()
                 idle.append(executor)
-                yield finished
+                if finished.outcome == "killed" and tries[job] < MAX_TRIES:
+                    again.append(job)
+                    continue
+                yield replace(finished, tries=tries[job])
     finally:
         for executor in [*idle, *(executor for _, executor in running.values())]:
             executor.shutdown(wait=False, kill_workers=True)
@@ -75,13 +88,14 @@ def run_job(job: Job) -> Finished:
     from bt_tamp.quiet import quiet_imports
 
     with quiet_imports():
+        from bt_tamp.disturb.classes import amended
         from bt_tamp.executive.loop import run_scenario
         from bt_tamp.report.recorder import RunRecorder
         from scenarios.errors import SceneError
         from scenarios.load import load_scenario
 
     try:
-        scenario = load_scenario(job.scene, job.options.seed)
+        scenario = amended(load_scenario(job.scene, job.options.seed), job.options.disturb)
         result = run_scenario(scenario, job.options, RunRecorder(scenario))
     except SceneError as error:
         return Finished(job, "wrong_input", str(error))

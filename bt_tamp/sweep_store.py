@@ -2,21 +2,23 @@
 
 import json
 import sqlite3
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 from bt_tamp.errors import UserError
-from bt_tamp.sweep import Finished, Job
+from bt_tamp.sweep import MAX_TRIES, Finished, Job
 
 UNFINISHED = ("crashed", "killed")
-"""Outcomes that a resumed sweep tries again."""
+"""Outcomes that a resumed sweep tries again, until MAX_TRIES."""
 
 _TABLE = """
 CREATE TABLE IF NOT EXISTS runs (
     scene TEXT NOT NULL, seed INTEGER NOT NULL, options TEXT NOT NULL,
     outcome TEXT NOT NULL, reason TEXT NOT NULL, result TEXT,
+    tries INTEGER NOT NULL DEFAULT 1,
     stored_at TEXT NOT NULL DEFAULT CURRENT_TIMESTAMP,
     PRIMARY KEY (scene, seed, options)
 )
@@ -30,6 +32,21 @@ class Row:
     outcome: str
     reason: str
     result: str | None
+    tries: int = 1
+
+    @property
+    def is_final(self) -> bool:
+        """Has it come to its end, or been tried often enough?"""
+        return self.outcome not in UNFINISHED or self.tries >= MAX_TRIES
+
+
+@dataclass(frozen=True)
+class Stored(Row):
+    """A stored run with what it was a run of: `options` as stored, the seed not among them."""
+
+    scene: str = ""
+    seed: int = 0
+    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 class SweepStore:
@@ -41,6 +58,9 @@ class SweepStore:
             self._connection = sqlite3.connect(path, timeout=30.0)
             self._connection.execute("PRAGMA journal_mode=WAL")
             self._connection.execute(_TABLE)
+            columns = {row[1] for row in self._connection.execute("PRAGMA table_info(runs)")}
+            if "tries" not in columns:  # A store of before runs were tried again.
+                self._connection.execute("ALTER TABLE runs ADD COLUMN tries INTEGER NOT NULL DEFAULT 1")
             self._connection.commit()
         except sqlite3.Error as error:
             raise UserError(f"{path}: can't be used as a store of results ({error})") from None
@@ -55,19 +75,32 @@ class SweepStore:
 
     def add(self, finished: Finished) -> None:
         """Store a run, in place of an earlier one of the same job."""
-        row = (*_key(finished.job), finished.outcome, finished.reason, finished.result)
+        before = self.get(finished.job)
+        tries = finished.tries + (before.tries if before is not None and before.outcome in UNFINISHED else 0)
+        row = (*_key(finished.job), finished.outcome, finished.reason, finished.result, tries)
         with self._connection:
             self._connection.execute(
-                "INSERT OR REPLACE INTO runs (scene, seed, options, outcome, reason, result) VALUES (?, ?, ?, ?, ?, ?)",
+                "INSERT OR REPLACE INTO runs (scene, seed, options, outcome, reason, result, tries)"
+                " VALUES (?, ?, ?, ?, ?, ?, ?)",
                 row,
             )
 
     def get(self, job: Job) -> Row | None:
         """What is stored of a job."""
         found = self._connection.execute(
-            "SELECT outcome, reason, result FROM runs WHERE scene = ? AND seed = ? AND options = ?", _key(job)
+            "SELECT outcome, reason, result, tries FROM runs WHERE scene = ? AND seed = ? AND options = ?", _key(job)
         ).fetchone()
         return None if found is None else Row(*found)
+
+    def everything(self) -> list[Stored]:
+        """All that is stored, by scene and seed."""
+        found = self._connection.execute(
+            "SELECT outcome, reason, result, tries, scene, seed, options FROM runs ORDER BY scene, options, seed"
+        ).fetchall()
+        return [
+            Stored(outcome, reason, result, tries, scene, seed, json.loads(options))
+            for outcome, reason, result, tries, scene, seed, options in found
+        ]
 
     def stored(self, jobs: Iterable[Job]) -> dict[Job, Row]:
         """Those of the jobs that are stored."""
@@ -82,5 +115,7 @@ def _key(job: Job) -> tuple[str, int, str]:
 def _distinction(job: Job) -> str:
     """What tells two runs of one scene and seed apart, as JSON."""
     data = {name: value for name, value in asdict(job.options).items() if name not in ("seed", "window")}
+    # Left out as they are by default, so that runs stored before these options existed are found again.
+    data = {name: value for name, value in data.items() if (name, value) not in (("disturb", ()), ("replan", True))}
     data |= {"digest": job.digest} if job.digest else {}
     return json.dumps(data, sort_keys=True, default=str)

@@ -1,4 +1,4 @@
-"""What a sweep found, summed up by scene."""
+"""What a sweep found, summed up by scene and what befell it."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,10 +17,11 @@ from bt_tamp.sweep_store import Row
 
 @dataclass(frozen=True)
 class Summary:
-    """One scene's runs: how many, how many reached the goal, medians (None without a finished run), contacts that no
-    phase had declared, and what failed as (seed, reason)."""
+    """One scene's runs with the same disturbances: how many, how many reached the goal, medians (None without a
+    finished run), contacts that no phase had declared, and what failed as (seed, reason)."""
 
     scene: str
+    disturb: tuple[str, ...]
     runs: int
     reached: int
     robot_s: float | None
@@ -31,16 +32,19 @@ class Summary:
 
 
 def summaries(rows: Mapping[Job, Row]) -> list[Summary]:
-    """One summary for each scene, in the order of the jobs."""
-    scenes = dict.fromkeys(job.scene for job in rows)
-    return [_summary(scene, [(job, row) for job, row in rows.items() if job.scene == scene]) for scene in scenes]
+    """One summary for each scene and what befell it, in the order of the jobs."""
+    groups: dict[tuple[str, tuple[str, ...]], list[tuple[Job, Row]]] = {}
+    for job, row in rows.items():
+        groups.setdefault((job.scene, job.options.disturb), []).append((job, row))
+    return [_summary(scene, disturb, group) for (scene, disturb), group in groups.items()]
 
 
-def _summary(scene: str, rows: Sequence[tuple[Job, Row]]) -> Summary:
+def _summary(scene: str, disturb: tuple[str, ...], rows: Sequence[tuple[Job, Row]]) -> Summary:
     results = [RunResult.from_json(row.result) for _, row in rows if row.result is not None]
     failed = sorted(((job.options.seed, row) for job, row in rows if row.outcome != "goal_reached"), key=itemgetter(0))
     return Summary(
         scene=scene,
+        disturb=disturb,
         runs=len(rows),
         reached=len(rows) - len(failed),
         robot_s=_median(result.robot_s for result in results),
@@ -67,11 +71,18 @@ def print_table(console: Console, rows: Mapping[Job, Row]) -> None:
         table.add_column(heading, justify="right")
     for one in found:
         figures = (_shown(one.robot_s), _shown(one.wall_s), _shown(one.planning_cpu_s))
-        table.add_row(Path(one.scene).stem, str(one.runs), f"{one.reached}/{one.runs}", *figures, str(one.unintended))
+        table.add_row(
+            " ".join((Path(one.scene).stem, *one.disturb)),
+            str(one.runs),
+            f"{one.reached}/{one.runs}",
+            *figures,
+            str(one.unintended),
+        )
     console.print(table)
     for one in found:
         for seed, reason in one.failures:
-            console.print(Text(f"{one.scene}, seed {seed}: {reason}"), soft_wrap=True)
+            befalling = f", {', '.join(one.disturb)}" if one.disturb else ""
+            console.print(Text(f"{one.scene}, seed {seed}{befalling}: {reason}"), soft_wrap=True)
 
 
 def _shown(value: float | None) -> str:

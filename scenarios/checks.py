@@ -12,6 +12,7 @@ from scenarios.document import KeyPath
 from scenarios.names import NAME, TABLE, known, name_problem
 from scenarios.regions import interior
 from scenarios.scenario import Region, Scenario, Table
+from scenarios.schema_parts import PoseOn
 from scenarios.solids import Solid, body_solid, region_hull, region_solid, table_solid
 from scenarios.standing import overlap_problem, support_problem
 
@@ -48,7 +49,7 @@ def reference_problems(file: schema.SceneFile) -> Iterator[Problem]:
     surfaces = {TABLE, *file.regions}
     for group in ("fixed", "objects", "tools"):
         for name, thing in getattr(file, group).items():
-            on = thing.pose.on if isinstance(thing.pose, schema.PoseOn) else TABLE
+            on = thing.pose.on if isinstance(thing.pose, PoseOn) else TABLE
             if on not in surfaces:
                 yield (group, name, "pose", "on"), f"unknown surface {on!r}, {known(on, surfaces)}"
             home = getattr(thing, "home", None)
@@ -61,7 +62,7 @@ def surface_problems(file: schema.SceneFile, scenario: Scenario) -> Iterator[Pro
     placed = {**scenario.fixtures, **scenario.bodies}
     for group in ("fixed", "objects", "tools"):
         for name, thing in getattr(file, group).items():
-            if not isinstance(thing.pose, schema.PoseOn):
+            if not isinstance(thing.pose, PoseOn):
                 continue
             on = thing.pose.on
             if on == TABLE:
@@ -118,7 +119,7 @@ def _dustpan_problems(region: Region, table: Table) -> Iterator[Problem]:
 def body_problems(file: schema.SceneFile, scenario: Scenario) -> Iterator[Problem]:
     """Movable bodies that overlap something, float, or hang over an edge."""
     still = immovable(scenario)
-    bodies = [body_solid(body) for body in scenario.bodies.values()]
+    bodies = [body_solid(body) for body in scenario.bodies.values() if body.name not in scenario.late]
     for i, solid in enumerate(bodies):
         others = [*still, *bodies[:i], *bodies[i + 1 :]]
         problem = overlap_problem(solid, [*still, *bodies[:i]]) or support_problem(solid, others)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from scenarios import checks, schema
+from scenarios.disturbing import disturbance_problems, disturbances, late_ones
 from scenarios.document import Document, read_document
 from scenarios.forms import forms
 from scenarios.goal import CLEAR_TABLE, GoalError, check_goal, clear_table, goal_text, parse_goal
@@ -33,21 +34,25 @@ def build_scenario(document: Document, seed: int = 0) -> Scenario:
     _refuse(document, [*checks.name_problems(file), *checks.reference_problems(file)])
     shapes, problems = forms(file, document.folder)
     _refuse(document, problems)
-    scenario = declared_scenario(file, shapes)
+    scenario = replace(declared_scenario(file, shapes), late=late_ones(file))
     try:
         scenario = replace(scenario, goal=_goal(scenario))
     except GoalError as error:
         raise schema.invalid(document, ("goal",), str(error)) from None
     _refuse(document, checks.surface_problems(file, scenario))
+    _refuse(document, disturbance_problems(file, scenario))
+    scenario = replace(scenario, disturbances=disturbances(file, scenario))
     _refuse(document, [*checks.surroundings_problems(scenario), *checks.body_problems(file, scenario)])
     if seed == 0:
         return scenario
     try:
-        poses = draw_poses(scenario.bodies, _noises(file), checks.immovable(scenario), seed)
+        there = {name: body for name, body in scenario.bodies.items() if name not in scenario.late}
+        noises = {name: noise for name, noise in _noises(file).items() if name in there}
+        poses = draw_poses(there, noises, checks.immovable(scenario), seed)
     except NoFreePose as error:
         path = (*checks.key_of(file, error.name), "pose")
         raise schema.invalid(document, path, f"seed {seed}: {error}") from None
-    bodies = {name: replace(body, X_WO=poses[name]) for name, body in scenario.bodies.items()}
+    bodies = {name: replace(body, X_WO=poses.get(name, body.X_WO)) for name, body in scenario.bodies.items()}
     return replace(scenario, seed=seed, bodies=bodies)
 
 

@@ -3,6 +3,7 @@
 import difflib
 import re
 from collections.abc import Iterable
+from typing import Literal
 
 from scenarios.robots import ROBOTS
 
@@ -16,6 +17,19 @@ PDDL_KEYWORDS = frozenset(
     "forall functions goal imply increase init metric not number object objects or over parameters precondition "
     "predicates problem requirements scale-down scale-up start total-cost types undefined when".split()
 )
+
+Disordered = Literal[
+    "force-bias",
+    "force-noise",
+    "force-missing",
+    "force-frozen",
+    "joint-delay",
+    "joint-friction",
+    "pose-noise",
+    "pose-delay",
+    "pose-missing",
+]
+"""What can be wrong with sensors and joints in a scene's disturbances."""
 
 SURROUNDINGS = frozenset({TABLE, "floor", "pedestal", "robot", "world"})
 

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from pinocchio import SE3
 
+from scenarios.disturbance import Disturbance
 from scenarios.shapes import Box, Shape
 
 OpenSide = Literal["+x", "-x", "+y", "-y"]
@@ -86,7 +87,11 @@ class Body:
 
 @dataclass(frozen=True)
 class Scenario:
-    """The scene with `seed` drawn. `goal` is the PDDL condition as text, `clear-table` expanded."""
+    """The scene with `seed` drawn. `goal` is the PDDL condition as text, `clear-table` expanded.
+
+    `late` are bodies that are not there at the start: the goal counts them once they were seen.
+    `disturbances` will befall the run.
+    """
 
     name: str
     seed: int
@@ -96,3 +101,5 @@ class Scenario:
     fixtures: Mapping[str, Fixture]
     bodies: Mapping[str, Body]
     goal: str
+    late: frozenset[str] = frozenset()
+    disturbances: tuple[Disturbance, ...] = ()

@@ -5,28 +5,32 @@ Sizes are full extents. Unknown keys are errors. `json_schema` gives the same as
 """
 
 import math
-from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from scenarios.document import Document, KeyPath
 from scenarios.errors import SceneInvalid
 from scenarios.names import known
 from scenarios.robots import ROBOTS
+from scenarios.schema_disturbances import Entry
+from scenarios.schema_parts import (
+    Angles,
+    BodyPose,
+    Degrees,
+    Extent,
+    LevelPose,
+    Number,
+    Part,
+    Pose,
+    Position,
+    Size,
+    problem,
+)
 from scenarios.wording import message_of, path_of, shown
 
 VERSION = 1
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Coordinate = Annotated[Number, Field(ge=-10, le=10)]
-Extent = Annotated[Number, Field(ge=0.001, le=10)]
-Degrees = Annotated[Number, Field(ge=-360, le=360)]
-Triple = Field(min_length=3, max_length=3)
-Position = Annotated[list[Coordinate], Triple]
-Size = Annotated[list[Extent], Triple]
-Angles = Annotated[list[Degrees], Triple]
 Mass = Annotated[Number, Field(gt=0, le=100, description="Mass in kg.")]
 Color = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}([0-9a-fA-F]{2})?$", description="#rrggbb or #rrggbbaa.")]
 Friction = Annotated[
@@ -41,69 +45,20 @@ Friction = Annotated[
 Home = Annotated[str | None, Field(description="The region where `clear-table` puts it; without: any bin.")]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _keys_are_known(cls, data: Any) -> Any:
-        if isinstance(data, Mapping):
-            for key in data:
-                if key not in cls.model_fields:
-                    raise _problem(str(key), f"unknown key, {known(str(key), cls.model_fields)}")
-        return data
-
-
-class Pose(_Part):
-    """A frame in W."""
-
-    xyz: Position = Field(description="Origin in W, metres.")
-    rpy_deg: Angles = Field(
-        default=[0.0, 0.0, 0.0],
-        description="Turn about W's fixed axes x, then y, then z (roll, pitch, yaw), in degrees.",
-    )
-
-
-class LevelPose(Pose):
-    """A frame in W whose z points up: roll and pitch are zero."""
-
-    @model_validator(mode="after")
-    def _is_level(self) -> "LevelPose":
-        if any(self.rpy_deg[:2]):
-            raise _problem("rpy_deg", f"roll and pitch are {self.rpy_deg[:2]}, expected zero: it stands level")
-        return self
-
-
-class PoseOn(_Part):
-    """Upright on a surface: the object's bottom rests on the table's top or the region's floor."""
-
-    on: str = Field(description="`table`, or a region's name.")
-    xy: Annotated[list[Coordinate], Field(min_length=2, max_length=2)] = Field(description="Origin in W, metres.")
-    yaw_deg: Degrees = Field(default=0.0, description="Turn about W's z in degrees.")
-
-
-def _pose_kind(data: Any) -> str:
-    is_on = "on" in data if isinstance(data, Mapping) else isinstance(data, PoseOn)
-    return "<on>" if is_on else "<xyz>"
-
-
-BodyPose = Annotated[Annotated[PoseOn, Tag("<on>")] | Annotated[Pose, Tag("<xyz>")], Discriminator(_pose_kind)]
-
-
-class Round(_Part):
+class Round(Part):
     """A cylinder along its own z axis."""
 
     radius: Extent
     height: Extent
 
 
-class Ball(_Part):
+class Ball(Part):
     """A sphere."""
 
     radius: Extent
 
 
-class Mesh(_Part):
+class Mesh(Part):
     """A convex mesh: the convex hull of points. Where these have their own origin makes no difference."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
@@ -119,11 +74,11 @@ class Mesh(_Part):
     @model_validator(mode="after")
     def _is_one(self) -> "Mesh":
         if (self.vertices is None) == (self.file is None):
-            raise _problem("", "expected either vertices or a file")
+            raise problem("", "expected either vertices or a file")
         return self
 
 
-class ConvexSolid(_Part):
+class ConvexSolid(Part):
     """One of box, cylinder, sphere and mesh. The origin is the centre of volume."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
@@ -138,18 +93,18 @@ class ConvexSolid(_Part):
         fields = type(self).model_fields
         given = [key for key in fields if getattr(self, key) is not None]
         if len(given) != 1:
-            raise _problem("", f"{len(given)} shapes are given, expected one of {', '.join(fields)}")
+            raise problem("", f"{len(given)} shapes are given, expected one of {', '.join(fields)}")
         return self
 
 
-class PartPose(_Part):
+class PartPose(Part):
     """The frame of a part (its centre of volume) among the other parts."""
 
     xyz: Position = Field(default=[0.0, 0.0, 0.0], description="Metres.")
     rpy_deg: Angles = Field(default=[0.0, 0.0, 0.0], description="About the fixed axes x, then y, then z, in degrees.")
 
 
-class SolidPart(_Part):
+class SolidPart(Part):
     """A convex part of a compound. All parts count in full: let them touch, but hardly overlap."""
 
     shape: ConvexSolid
@@ -165,7 +120,7 @@ class Solid(ConvexSolid):
     )
 
 
-class Robot(_Part):
+class Robot(Part):
     """The arm, where its base stands and how it starts."""
 
     model: str = Field(default="iiwa14_wsg50", description="Name of the robot's model.")
@@ -177,14 +132,14 @@ class Robot(_Part):
     @model_validator(mode="after")
     def _is_known_and_within_limits(self) -> "Robot":
         if self.model not in ROBOTS:
-            raise _problem("model", f"unknown robot {self.model!r}, {known(self.model, ROBOTS)}")
+            raise problem("model", f"unknown robot {self.model!r}, {known(self.model, ROBOTS)}")
         for i, (q, limit) in enumerate(zip(self.q0_deg, ROBOTS[self.model].q_max_deg, strict=True)):
             if abs(q) > limit:
-                raise _problem("q0_deg", f"joint {i + 1} is at {q}°, expected at most ±{limit:g}°")
+                raise problem("q0_deg", f"joint {i + 1} is at {q}°, expected at most ±{limit:g}°")
         return self
 
 
-class Table(_Part):
+class Table(Part):
     """The table's plate."""
 
     size: Size = Field(description="Full extents in metres; the last is the plate's thickness.")
@@ -192,7 +147,7 @@ class Table(_Part):
     friction: Friction = 0.5
 
 
-class Region(_Part):
+class Region(Part):
     """A container: a bin has four walls; a dustpan has three, and is open at one side.
 
     A dustpan with a ramp stands on the table, the bottom edge of its open side flush with the
@@ -214,23 +169,23 @@ class Region(_Part):
     @model_validator(mode="after")
     def _is_a_container(self) -> "Region":
         if min(self.size[:2]) <= 2 * self.wall or self.size[2] <= self.wall:
-            raise _problem("size", f"{self.size} leaves no space inside walls of {self.wall} m, expected more")
+            raise problem("size", f"{self.size} leaves no space inside walls of {self.wall} m, expected more")
         if self.kind == "dustpan" and self.open_side is None:
-            raise _problem("open_side", "is missing, expected one of +x, -x, +y, -y: a dustpan has an open side")
+            raise problem("open_side", "is missing, expected one of +x, -x, +y, -y: a dustpan has an open side")
         if self.kind == "bin" and self.open_side is not None:
-            raise _problem("open_side", "a bin has four walls, expected none (or kind dustpan)")
+            raise problem("open_side", "a bin has four walls, expected none (or kind dustpan)")
         if self.ramp_deg is None:
             return self
         if self.open_side is None:
-            raise _problem("ramp_deg", "a bin has no ramp, expected none (or kind dustpan)")
+            raise problem("ramp_deg", "a bin has no ramp, expected none (or kind dustpan)")
         depth = self.size["xy".index(self.open_side[1])] - self.wall
         ramp = self.wall / math.tan(math.radians(self.ramp_deg))
         if ramp >= depth:
-            raise _problem("ramp_deg", f"the ramp is {ramp:.3f} m long, expected less than the inside's {depth:.3f} m")
+            raise problem("ramp_deg", f"the ramp is {ramp:.3f} m long, expected less than the inside's {depth:.3f} m")
         return self
 
 
-class Fixed(_Part):
+class Fixed(Part):
     """Something that never moves and is in the way."""
 
     shape: Solid
@@ -239,7 +194,7 @@ class Fixed(_Part):
     color: Color = "#8a8f98"
 
 
-class Noise(_Part):
+class Noise(Part):
     """Uniform noise on the start pose, for every seed but 0: one stream for each object, named by seed and name."""
 
     xy: Annotated[Number, Field(ge=0, le=1)] = Field(default=0.0, description="Up to ± this in W's x and y, metres.")
@@ -248,7 +203,7 @@ class Noise(_Part):
     )
 
 
-class Thing(_Part):
+class Thing(Part):
     """An object to be cleared away. It is a crumb if its largest extent is below the gripper's smallest grasp."""
 
     shape: Solid
@@ -260,7 +215,7 @@ class Thing(_Part):
     home: Home = None
 
 
-class Tool(_Part):
+class Tool(Part):
     """A movable thing that the robot works with. A sponge is a soft box."""
 
     kind: Literal["sponge"]
@@ -281,11 +236,11 @@ class Tool(_Part):
     @model_validator(mode="after")
     def _is_a_box(self) -> "Tool":
         if self.shape.box is None:
-            raise _problem("shape", "a sponge is a box, expected {box: [x, y, z]}")
+            raise problem("shape", "a sponge is a box, expected {box: [x, y, z]}")
         return self
 
 
-class SceneFile(_Part):
+class SceneFile(Part):
     """A scene: what stands where, and what must become of it.
 
     Names match [a-z][a-z0-9_-]*, are given once in the whole file, and are neither PDDL keywords
@@ -307,6 +262,7 @@ class SceneFile(_Part):
         "the table; (put_away OBJECT) lies in some bin; (holding OBJECT); (hand_empty). Or `clear-table`: every crumb "
         "in the dustpan, every other object and each tool in its `home`."
     )
+    disturbances: list[Entry] = Field(default=[], max_length=100, description="What goes wrong during a run, and when.")
 
 
 def json_schema() -> dict[str, Any]:
@@ -337,7 +293,3 @@ def invalid(document: Document, path: KeyPath, message: str, more: int = 0) -> S
     """The error for one problem at a key path, with the number of further ones."""
     rest = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
     return SceneInvalid(message + rest, document.file, document.place(path))
-
-
-def _problem(key: str, message: str) -> PydanticCustomError:
-    return PydanticCustomError("scene", "{message}", {"message": message, "key": key})

@@ -95,6 +95,7 @@ class BulletPlant:
         self._free.atexit = False
         self._names: dict[tuple[int, int], str] = {}
         self._turned: dict[str, tuple[tuple[float, ...], SE3]] = {}
+        self._shifted: dict[str, SE3] = {}
         p.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
         p.setPhysicsEngineParameter(
             fixedTimeStep=PHYSICS_STEP,
@@ -104,7 +105,7 @@ class BulletPlant:
             physicsClientId=self._client,
         )
         self._add_room(scenario)
-        self._bodies = {name: self._add_body(name) for name in scenario.bodies}
+        self._bodies = {name: self._add_body(name) for name in scenario.bodies if name not in scenario.late}
         self._add_robot(scenario, robot)
         if window:
             frame_scene(scenario, self._client)
@@ -131,6 +132,7 @@ class BulletPlant:
             wrist=Wrench(force, self._lever @ force - np.array(sensor[3:])),
             poses=poses,
             velocities=velocities,
+            regions=self._shifted,
         )
 
     def _look(self) -> tuple["_Converted[SE3]", "_Converted[np.ndarray]"]:
@@ -222,8 +224,42 @@ class BulletPlant:
             self._bodies[name], list(pose[:3]), list(pose[3:]), physicsClientId=self._client
         )
         p.resetBaseVelocity(self._bodies[name], [0.0] * 3, [0.0] * 3, physicsClientId=self._client)
+        self._wake_all()
+
+    def take_away(self, name: str) -> None:
+        """Take a body out of the world, for disturbances."""
+        body = self._bodies.pop(name)
+        del self._names[body, -1]
+        p.removeBody(body, physicsClientId=self._client)
+        self._wake_all()
+
+    def bring(self, name: str, X_WO: SE3) -> None:
+        """Put a declared body that is not there into the world, at rest, for disturbances."""
+        if name in self._bodies:
+            raise ValueError(f"body {name!r} is there already")
+        self._bodies[name] = self._add_body(name)
+        self.put(name, X_WO)
+
+    def shift_region(self, name: str, by: tuple[float, float, float]) -> None:
+        """Shift a region in W (m) with what lies in it, for disturbances. Raises KeyError for an unknown one."""
+        region = self.scenario.regions[name]
+        X_WR = self._shifted.get(name, region.X_WR)
+        half, shift = np.array(region.size) / 2, np.array(by)
+        X_WO = dict(self._look()[0])
+        inside = {self._bodies[body] for body, X in X_WO.items() if (np.abs(X_WR.actInv(X.translation)) < half).all()}
+        for body in inside.union(body for (body, _), known in self._names.items() if known == name):
+            position, quaternion = p.getBasePositionAndOrientation(body, physicsClientId=self._client)
+            p.resetBasePositionAndOrientation(body, list(shift + position), quaternion, physicsClientId=self._client)
+        self._shifted = {**self._shifted, name: SE3(X_WR.rotation, X_WR.translation + shift)}
+        self._wake_all()
+
+    def set_friction(self, name: str, friction: float) -> None:
+        """From now on a body has this friction, for disturbances."""
+        p.changeDynamics(self._bodies[name], -1, lateralFriction=friction, physicsClientId=self._client)
+
+    def _wake_all(self) -> None:
+        """The engine does not see that what rested on something that was moved lies on nothing now; nor do we yet."""
         self._unseen = SEEN_EVERY
-        # Not only that one: the engine does not see that what rested on it lies on nothing now.
         for body in self._bodies.values():
             p.changeDynamics(body, -1, activationState=p.ACTIVATION_STATE_WAKE_UP, physicsClientId=self._client)
 
@@ -238,6 +274,11 @@ class BulletPlant:
             forces=[float(t) for t in torque],
             physicsClientId=self._client,
         )
+
+    def set_opening(self, opening: float) -> None:
+        """Put the fingers `opening` metres apart at once: a run that goes on begins with what its hand was like."""
+        for finger in self._finger_joints:
+            p.resetJointState(self._robot, finger, opening / 2, physicsClientId=self._client)
 
     def scale_masses(self, factor: float) -> None:
         """Make every moving link of the robot `factor` times as heavy as its model says, inertia included."""
@@ -407,7 +448,7 @@ class _Converted(Mapping[str, T], Generic[T]):
         self._raw, self._convert = raw, convert
         self._known: dict[str, T] = {}
         if before is not None:
-            self._known = {name: known for name, known in before._known.items() if before._raw[name] == raw[name]}
+            self._known = {name: known for name, known in before._known.items() if before._raw[name] == raw.get(name)}
 
     def __getitem__(self, name: str) -> T:
         if name not in self._known:

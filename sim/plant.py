@@ -5,7 +5,7 @@ nothing above changing.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -23,7 +23,9 @@ class Observation:
     grip_force: force in N with which the fingers' drive presses (0 when free).
     wrist: wrench that the hand exerts on the flange's sensor, in the sensor frame at the
     flange, gravity and inertia of the hand included, as a real sensor reads it.
-    poses: X_WO of every movable body; velocities: V_WO (6,), linear before angular, in W.
+    poses: X_WO of every movable body that is seen; velocities: V_WO (6,), linear before angular, in W.
+    seen_at: when (s) a body was seen so, for those whose pose is older than t.
+    regions: X_WR of the containers, as far as they are known not to stand where they were declared.
     """
 
     t: float
@@ -36,6 +38,8 @@ class Observation:
     wrist: Wrench
     poses: Mapping[str, SE3]
     velocities: Mapping[str, np.ndarray]
+    seen_at: Mapping[str, float] = field(default_factory=dict)
+    regions: Mapping[str, SE3] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,9 @@ ARM_HEIGHT = 0.85
 """Metres above the base up to which the camera shows the arm."""
 
 LIGHT_SIZE = 560
+OUT_OF_SIGHT = np.array([0.0, 0.0, -100.0, 0.0, 0.0, 0.0, 1.0])
+"""Pose of a body that isn't there."""
+
 BIAS = np.float32(0.012)
 """Metres by which something must be nearer to the light than a point in order to shade it."""
 
@@ -90,10 +93,11 @@ class Renderer:
         self, q: np.ndarray, opening: float, poses: Mapping[str, np.ndarray], window: Window | None = None
     ) -> np.ndarray:
         """Pixels (height, width, 3) uint8 of a state: q (7,) rad, opening in m, poses (7,) as position and
-        quaternion xyzw in W by body. `window`: where something that moves may be seen (None: found out)."""
+        quaternion xyzw in W by body; bodies left out aren't there. `window`: where something that moves may
+        be seen (None: found out)."""
         self._robot.put(q, opening)
-        for name, pose in poses.items():
-            self._stage.put(self._bodies[name], pose)
+        for name, body in self._bodies.items():
+            self._stage.put(body, poses.get(name, OUT_OF_SIGHT))
         left, top, width, height = window = window or self.window(q, opening, poses)
         here = np.s_[top : top + height, left : left + width]
         front, distance = self._stage.look(self.camera, window)
@@ -134,7 +138,7 @@ def overview(scenario: Scenario, width: int, height: int, foot: float = 0.0) -> 
     points = [base.act(np.array([0.0, 0.0, z])) for z in (0.0, ARM_HEIGHT)]
     solids = [(scenario.table.shape, scenario.table.X_WT)]
     solids += [(Box(region.size), region.X_WR) for region in scenario.regions.values()]
-    solids += [(body.shape, body.X_WO) for body in scenario.bodies.values()]
+    solids += [(body.shape, body.X_WO) for body in scenario.bodies.values() if body.name not in scenario.late]
     solids += [(fixture.shape, fixture.X_WO) for fixture in scenario.fixtures.values()]
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     for shape, X_WO in solids:

@@ -48,8 +48,8 @@ class SceneState:
 
     @staticmethod
     def initial(scenario: Scenario, opening: float) -> "SceneState":
-        """The scenario's start: every body at its declared pose, the arm at q0, the hand empty."""
-        poses = {name: body.X_WO for name, body in scenario.bodies.items()}
+        """The scenario's start: every body that is there at its declared pose, the arm at q0, the hand empty."""
+        poses = {name: body.X_WO for name, body in scenario.bodies.items() if name not in scenario.late}
         return SceneState(scenario, poses, scenario.robot.q0, opening)
 
     def moved(self, name: str, X_WO: SE3) -> "SceneState":

@@ -30,6 +30,11 @@ class GripDriver:
         """Are the fingers told to press?"""
         return self._target is None
 
+    @property
+    def force(self) -> float:
+        """Newtons with which each finger presses, 0 unless told to."""
+        return self._force if self.is_closing else 0.0
+
     def open_to(self, opening: float) -> None:
         """Bring the fingers `opening` metres apart and keep them there."""
         self._target = min(max(float(opening), 0.0), self._gripper.stroke)
@@ -77,7 +82,8 @@ class SkillContext:
     """Shared by all leaves; the executive brings `observation` and `scene` up to date before each tick of the tree.
 
     refine: an action's motion in the present scene, and the simulated seconds that finding it costs.
-    phase, allowed: what runs now, and the contacts it declares.
+    phase, allowed: what runs now, and the contacts it declares. is_watchful: motions are watched while they run, and
+    actions worked out again where they start; else they are carried out as planned, whatever is seen.
     """
 
     robot: RobotModel
@@ -87,6 +93,7 @@ class SkillContext:
     scene: SceneState
     refine: Callable[[GroundAction], tuple[Refinement | RefinementFailure, float]]
     contact_mode: Mode = "hybrid"
+    is_watchful: bool = True
     report: Callable[..., None] = _ignore
     failure: Failure | None = None
     phase: Phase | None = None

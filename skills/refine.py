@@ -38,6 +38,7 @@ class Refine(Behaviour):
         self._stopping_since: float | None = None
         self._ready_at = 0.0
         self._watch: Watch | None = None
+        self._borne = ""
 
     def terminate(self, new_status: Status) -> None:
         if new_status == Status.INVALID:
@@ -45,6 +46,9 @@ class Refine(Behaviour):
             self._forget()
 
     def update(self) -> Status:
+        if not self._context.is_watchful:
+            self._bear_what_is_held()
+            return Status.SUCCESS
         if self._watch is not None:
             changed = self._what_changed(self._watch)
             if changed is None:
@@ -74,10 +78,14 @@ class Refine(Behaviour):
         assert self._scene is not None
         self._run.refinement = self._outcome
         self._watch = Watch(self._motion, self._outcome, self._scene)
-        held = context.scene.held
-        if held is not None:
-            context.controller.set_payload(*load_of(context.scene, held.name))
+        self._bear_what_is_held()
         return Status.SUCCESS
+
+    def _bear_what_is_held(self) -> None:
+        held = self._context.scene.held
+        if held is not None and held.name != self._borne:
+            self._context.controller.set_payload(*load_of(self._context.scene, held.name))
+            self._borne = held.name
 
     def _what_changed(self, watch: Watch) -> str | None:
         context = self._context
@@ -107,7 +115,7 @@ class PathFree(Behaviour):
 
     def update(self) -> Status:
         context, refinement = self._context, self._run.refinement
-        if refinement is None:
+        if refinement is None or not context.is_watchful:
             return Status.SUCCESS
         if self._watch is None:
             self._watch = Watch(self._motion, refinement, context.scene)

@@ -29,6 +29,8 @@ class Watch:
         self._refined = scene
         self._looked_at = scene.poses
         self._objects = [name for name in refinement.action.args if name in scene.poses and not _holds(scene, name)]
+        self._regions = self._regions_looked_at = scene.scenario.regions
+        self._places = [name for name in refinement.action.args if name in self._regions]
 
     def object_shifted(self, scene: SceneState) -> str | None:
         """Which of the action's objects no longer lies where it was refined for, in a sentence."""
@@ -36,6 +38,9 @@ class Watch:
             if name not in scene.poses:
                 return f"{name} is gone"
             if _has_moved(self._refined.poses[name], scene.poses[name], SHIFT, TURN):
+                return f"{name} was moved"
+        for name in self._places:
+            if scene.scenario.regions[name] is not self._regions[name]:
                 return f"{name} was moved"
         return None
 
@@ -52,6 +57,10 @@ class Watch:
             and not _holds(scene, name)
             and (name not in self._looked_at or _has_moved(self._looked_at[name], X_WO, STIR, STIR_TURN))
         ]
+        regions = scene.scenario.regions
+        stirred += [
+            name for name in regions if name not in may_touch and regions[name] is not self._regions_looked_at[name]
+        ]
         if not stirred:
             return None
         for ahead, start in self._ahead(phase, since):
@@ -59,7 +68,7 @@ class Watch:
             failure = self._motion.audit(seen, ahead.trajectory, ahead.allowed, since=start, only=frozenset(stirred))
             if failure is not None:
                 return failure
-        self._looked_at = scene.poses
+        self._looked_at, self._regions_looked_at = scene.poses, regions
         return None
 
     def _ahead(self, phase: Phase, since: float) -> Sequence[tuple[Phase, float]]:

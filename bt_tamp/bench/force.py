@@ -11,8 +11,10 @@ from rich.console import Console
 from bt_tamp.bench.checks import Check, at_most
 from bt_tamp.bench.scene import SPONGE, Truth, believed
 from bt_tamp.bench.slide import Case, Law, SlideResult, run_slide
-from sim.disturbance import Fault, ForceBias, ForceDelay, ForceNoise, JointFriction
+from sim.disturbance import Fault
 from sim.robot import WSG50
+from sim.robot_faults import JointFriction
+from sim.sensor_faults import ForceBias, ForceDelay, ForceNoise
 
 WHAT = "slides"
 TARGETS = (5.0, 10.0, 20.0, 40.0)

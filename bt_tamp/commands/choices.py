@@ -9,9 +9,14 @@ if TYPE_CHECKING:
     from scenarios.scenario import Scenario
 
 
-def add_scene(parser: argparse.ArgumentParser) -> None:
+def add_scene(parser: argparse.ArgumentParser, is_optional: bool = False) -> None:
     """The scene and its seed."""
-    parser.add_argument("scene", metavar="SCENE", help="a shipped scene's name (bt-tamp list) or a scene file")
+    parser.add_argument(
+        "scene",
+        metavar="SCENE",
+        nargs="?" if is_optional else None,
+        help="a shipped scene's name (bt-tamp list) or a scene file",
+    )
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="0 (default): the nominal scene; else noise drawn from N"
     )
@@ -39,6 +44,25 @@ def add_planning(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--problem", type=Path, metavar="FILE", help="hand-written PDDL problem, with --domain")
 
 
+def add_disturbances(parser: argparse.ArgumentParser) -> None:
+    """What befalls a run, and whether it watches."""
+    from bt_tamp.disturb.names import CLASSES
+
+    group = parser.add_argument_group("disturbances")
+    group.add_argument(
+        "--disturb",
+        default="none",
+        metavar="CLASS,…",
+        help=f"classes of disturbances, all or none (default); {', '.join(CLASSES)}",
+    )
+    group.add_argument(
+        "--no-replan",
+        dest="replan",
+        action="store_false",
+        help="the open-loop baseline: the first plan is carried out blindly, and a failure ends the run",
+    )
+
+
 def add_time_limit(parser: argparse.ArgumentParser) -> None:
     """When to give up."""
     parser.add_argument(
@@ -51,8 +75,13 @@ def options_of(arguments: argparse.Namespace, window: bool = False) -> "RunOptio
     from bt_tamp.errors import refusing
     from bt_tamp.options import RunOptions
 
-    names = "seed contact preset search tries motion_planner domain problem max_sim_time".split()
+    names = "seed contact preset search tries motion_planner domain problem replan max_sim_time".split()
     given = {name: getattr(arguments, name) for name in names if hasattr(arguments, name)}
+    if hasattr(arguments, "disturb"):
+        from bt_tamp.disturb.names import chosen
+
+        with refusing(ValueError, about="--disturb"):
+            given["disturb"] = chosen(arguments.disturb)
     with refusing(ValueError):
         options = RunOptions(**given, window=window)
     _check_names(options)

@@ -2,24 +2,31 @@
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_tamp.commands.choices import add_planning, add_scene, add_time_limit, options_of, scenario_of
+from bt_tamp.commands.choices import add_disturbances, add_planning, add_scene, add_time_limit, options_of, scenario_of
 from bt_tamp.commands.stopping import stop_on_signals
 
 if TYPE_CHECKING:
     from bt_tamp.report.result import RunResult
+    from bt_tamp.report.state import RunState
+    from scenarios.scenario import Scenario
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Scene, options, folder, picture."""
-    add_scene(parser)
+    add_scene(parser, is_optional=True)
+    parser.add_argument(
+        "--resume", type=Path, metavar="DIR", help="go on from where the run in this folder ended, in place of a SCENE"
+    )
     parser.add_argument(
         "--render", action="store_true", help="PyBullet's window where there is a display, else an MP4 after the run"
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="the run's folder (default: runs/SCENE-SEED[-n])")
     parser.add_argument("--force", action="store_true", help="replace a run that lies in the folder already")
+    add_disturbances(parser)
     add_time_limit(parser)
     add_planning(parser)
 
@@ -29,7 +36,8 @@ def call(arguments: argparse.Namespace) -> int:
     from bt_tamp.display import has_display
 
     options = options_of(arguments, window=arguments.render and has_display())
-    scenario = scenario_of(arguments)
+    scenario, start = _beginning(arguments)
+    options = replace(options, seed=scenario.seed)
 
     from bt_tamp.report.folder import RunFolder
 
@@ -39,12 +47,14 @@ def call(arguments: argparse.Namespace) -> int:
     from bt_tamp.quiet import outliving_a_closed_pipe, quiet_imports
 
     with quiet_imports():
+        from bt_tamp.disturb.classes import amended
         from bt_tamp.executive.loop import run_scenario
     from bt_tamp.report.live import watcher
     from bt_tamp.report.recorder import RunRecorder
 
+    scenario = amended(scenario, options.disturb)
     with RunRecorder(scenario, folder, watcher(sys.stdout)) as recorder:
-        result = run_scenario(scenario, options, recorder)
+        result = run_scenario(scenario, options, recorder, start)
     video = None
     if arguments.render and not options.window and result.outcome not in ("interrupted", "crashed"):
         video = _render(folder.path)
@@ -52,6 +62,26 @@ def call(arguments: argparse.Namespace) -> int:
         print(_closing(result))
         print(folder.path if video is None else video)
     return result.exit_code
+
+
+def _beginning(arguments: argparse.Namespace) -> "tuple[Scenario, RunState | None]":
+    """The scene, or where another run ended. Raises UserError, FolderError or SceneError."""
+    from bt_tamp.errors import UserError, refusing
+
+    if (arguments.scene is None) == (arguments.resume is None):
+        raise UserError("name a scene, or a run's folder with --resume; one of them")
+    if arguments.resume is None:
+        return scenario_of(arguments), None
+
+    from bt_tamp.report.folder import SCENARIO, STATE, existing_run
+    from bt_tamp.report.scenario_json import scenario_from_json
+    from bt_tamp.report.state import RunState
+
+    folder = existing_run(arguments.resume)
+    with refusing(OSError, ValueError, about=str(folder)):
+        scenario = scenario_from_json((folder / SCENARIO).read_text(encoding="utf-8"))
+        start = RunState.from_json((folder / STATE).read_text(encoding="utf-8"))
+        return start.applied(scenario), start
 
 
 def _render(folder: Path) -> Path | None:
@@ -89,4 +119,6 @@ def _listed(names: list[str]) -> str:
 def _where(place: str, are_many: bool) -> str:
     if place == "hand":
         return "still in the hand"
+    if place == "nowhere":
+        return f"{'are' if are_many else 'is'} nowhere to be seen"
     return f"{'lie' if are_many else 'lies'} {'on the' if place in ('table', 'floor') else 'in'} {place}"

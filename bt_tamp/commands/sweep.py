@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_tamp.commands.choices import add_planning, add_time_limit, options_of
+from bt_tamp.commands.choices import add_disturbances, add_planning, add_time_limit, options_of
 from bt_tamp.commands.stopping import stop_on_signals
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--resume", action="store_true", help="keep the runs that are stored; repeat those that crashed or were killed"
     )
+    add_disturbances(parser)
     add_time_limit(parser)
     add_planning(parser)
 
@@ -58,14 +59,14 @@ def call(arguments: argparse.Namespace) -> int:
     from rich.console import Console
 
     from bt_tamp.errors import UserError
-    from bt_tamp.sweep_store import UNFINISHED, SweepStore
+    from bt_tamp.sweep_store import SweepStore
     from bt_tamp.sweep_table import print_table
 
     with SweepStore(arguments.store) as store:
         stored = store.stored(jobs)
         if stored and not arguments.resume:
             raise UserError(f"{arguments.store}: holds {len(stored)} of these runs already; --resume goes on with it")
-        left = [job for job in jobs if job not in stored or stored[job].outcome in UNFINISHED]
+        left = [job for job in jobs if job not in stored or not stored[job].is_final]
         stop_on_signals()
         try:
             _run(left, arguments.jobs, store)
@@ -86,11 +87,18 @@ def _jobs(arguments: argparse.Namespace) -> "list[Job]":
     from scenarios.load import load_scenario
 
     options = options_of(arguments)
+    # One run a class, and beside them the undisturbed one, against which lost time is told.
+    befalling = [(), *((name,) for name in options.disturb)]
     digests = {}
     for scene in arguments.scenes:
         load_scenario(scene)
         digests[scene] = sha256(scenario_path(scene).read_bytes()).hexdigest()[:16]
-    return [Job(scene, replace(options, seed=seed), digests[scene]) for scene in digests for seed in arguments.seeds]
+    return [
+        Job(scene, replace(options, seed=seed, disturb=disturb), digests[scene])
+        for scene in digests
+        for seed in arguments.seeds
+        for disturb in befalling
+    ]
 
 
 def _run(jobs: "list[Job]", processes: int, store: "SweepStore") -> None:
@@ -109,14 +117,17 @@ def _run(jobs: "list[Job]", processes: int, store: "SweepStore") -> None:
         closing(run_jobs(jobs, min(processes, len(jobs)))) as arriving,
     ):
         task = bar.add_task("runs", total=len(jobs))
+        reached = 0
         for number, finished in enumerate(arriving, start=1):
             store.add(finished)
             bar.advance(task)
-            said = f"{number}/{len(jobs)} {_said(finished)}"
+            reached += finished.outcome == "goal_reached"
+            said = f"{number}/{len(jobs)} ({reached} reached) {_said(finished)}"
             print(said, file=sys.stderr) if is_silent else bar.console.print(said, highlight=False, markup=False)
 
 
 def _said(finished: "Finished") -> str:
     seed, outcome = finished.job.options.seed, finished.outcome.replace("_", " ")
     reason = "" if finished.outcome == "goal_reached" else f": {finished.reason}"
-    return f"{finished.job.scene}, seed {seed}: {outcome}{reason}"
+    befalling = f", {', '.join(finished.job.options.disturb)}" if finished.job.options.disturb else ""
+    return f"{finished.job.scene}, seed {seed}{befalling}: {outcome}{reason}"

@@ -18,8 +18,11 @@ from skills.skill import Skill
 class Agenda:
     """What is to be done, and how far it has come.
 
-    `facts` states a believed scene in the planner's predicates. `rebuilt` is called whenever `act`
-    has new children, `done` with what was carried out to its effect.
+    `goal` is what is wanted; `late` bodies are not counted before they were seen (`order` is all that was asked for,
+    `unseen` those of them that are still to come). Without `is_watchful` the first plan is
+    carried out whatever is seen, and nothing is skipped or done again. `facts` states a believed scene
+    in the planner's predicates. `rebuilt` is called whenever `act` has new children, `done`
+    with what was carried out to its effect.
     """
 
     def __init__(
@@ -29,8 +32,10 @@ class Agenda:
         facts: Callable[[SceneState], frozenset[Fact]],
         rebuilt: Callable[[str], None],
         done: Callable[[Refinement], None],
+        late: frozenset[str] = frozenset(),
+        is_watchful: bool = True,
     ) -> None:
-        self.goal = goal
+        self.is_watchful = is_watchful
         self.facts = facts
         self.act = Sequence("act", memory=True, children=[Waiting()])
         self.plan: TaskPlan | None = None
@@ -39,8 +44,46 @@ class Agenda:
         self._skills = skills
         self._rebuilt = rebuilt
         self._done = done
+        self.order, self.unseen = goal, late
         self._refinements: tuple[Refinement, ...] = ()
         self._running = 0
+
+    @property
+    def goal(self) -> frozenset[Fact]:
+        """What is wanted now."""
+        return frozenset(fact for fact in self.order if self.unseen.isdisjoint(fact.args))
+
+    def want(self, goal: frozenset[Fact]) -> None:
+        """Somebody wants something else from now on."""
+        self.order = goal
+
+    def look_out(self, scene: SceneState) -> None:
+        """What comes late is asked for as soon as it is there."""
+        self.unseen = self.unseen - scene.poses.keys()
+
+    def pursued(self, scene: SceneState) -> frozenset[Fact]:
+        """The part of the goal that can be worked on: what it is about is to be seen."""
+        bodies = scene.scenario.bodies
+        return frozenset(f for f in self.goal if all(arg in scene.poses for arg in f.args if arg in bodies))
+
+    def missing(self, scene: SceneState) -> tuple[str, ...]:
+        """Bodies that should be there and are nowhere to be seen."""
+        return tuple(name for name in scene.scenario.bodies if name not in scene.poses and name not in self.unseen)
+
+    @property
+    def refinements(self) -> tuple[Refinement, ...]:
+        """How the steps of the plan in force were to be done, when it was made."""
+        return self._refinements
+
+    @property
+    def is_over(self) -> bool:
+        """Is every step of the plan in force done?"""
+        return self.plan is not None and self._running >= len(self.plan.steps)
+
+    @property
+    def left(self) -> tuple[GroundAction, ...]:
+        """What is left of the plan, the running action first."""
+        return () if self.plan is None else self.plan.actions[self._running :]
 
     @property
     def running(self) -> GroundAction | None:
@@ -66,6 +109,10 @@ class Agenda:
             return context.failure.reason
         if self.plan is None:
             return "there is no plan yet"
+        if not self.is_watchful:
+            return None
+        if self.plan.goal != self.pursued(context.scene):
+            return self._what_changed(context.scene)
         facts = self.facts(context.scene)
         if not self.is_between_actions:
             good = still_good_while(self.plan, self._running, facts)
@@ -76,6 +123,14 @@ class Agenda:
         if k != self._running:
             self._build_from(k, context, "skipped" if k > self._running else "redone")
         return None
+
+    def _what_changed(self, scene: SceneState) -> str:
+        """Why the plan in force is for something else than what is wanted now."""
+        assert self.plan is not None
+        gone = sorted({fact.args[0] for fact in self.plan.goal & self.goal - self.pursued(scene)})
+        if gone:
+            return f"{', '.join(gone)} can't be seen any more"
+        return "what is wanted, or what is there, has changed"
 
     def begin(self) -> None:
         """An action of the plan has started."""

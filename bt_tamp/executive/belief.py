@@ -1,8 +1,14 @@
 """From observations to the believed scene: where things are, and what the hand holds."""
 
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 from pinocchio import SE3
 
+from bt_tamp.executive.rest import at_rest
+from bt_tamp.executive.sighting import REMEMBERED, Sighting
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, outline
 from sim.plant import Observation
@@ -19,34 +25,96 @@ KEEP_REACH = 0.025
 PAD_DEPTH = 0.01
 FINGERS_AT_REST = 0.01
 
+OLDEST = 1.0
+"""Seconds for which it is remembered where the hand was: as late as a pose may be told."""
+
 
 class Belief:
-    """Keeps the believed scene; only `holding` needs memory, for its hysteresis."""
+    """Keeps the believed scene. A body is remembered for a while when it is out of sight, its pose averaged when it is
+    noisy; a held one moves along with the hand."""
 
     def __init__(self, scenario: Scenario, robot: RobotModel) -> None:
-        self._scenario = scenario
+        self._scenario = self._declared = scenario
         self._robot = robot
         self._held: str | None = None
+        self._regions: Mapping[str, SE3] = {}
+        self._lying: dict[str, Sighting] = {}
+        self._in_hand = Sighting()
+        self._X_GO: SE3 | None = None
+        self._known: dict[str, tuple[float, SE3]] = {}
+        self._hands: deque[tuple[float, SE3]] = deque()
 
     def update(self, observation: Observation, is_closing: bool) -> SceneState:
         """The scene as believed after an observation; `is_closing`: the fingers are told to press."""
         X_WG = self._robot.X_WG(observation.q)
-        self._held = self._held_name(observation, X_WG, is_closing)
+        self._remember_hand(observation.t, X_WG)
+        self._look_at_regions(observation.regions)
+        poses = self._poses(observation)
+        before = self._held
+        if before is not None:
+            self._X_GO = self._seen_in_hand(before, observation, X_WG)
+            if self._X_GO is not None:
+                poses[before] = X_WG * self._X_GO
+        self._held = self._held_name(observation, X_WG, poses, is_closing)
         held = None
         if self._held is not None:
-            held = Held(self._held, X_WG.inverse() * observation.poses[self._held])
-        return SceneState(self._scenario, observation.poses, observation.q, observation.opening, held)
+            if self._held != before or self._X_GO is None:
+                self._in_hand = Sighting()
+                self._X_GO = X_WG.inverse() * poses[self._held]
+            poses[self._held] = X_WG * self._X_GO
+            self._known[self._held] = (observation.t, poses[self._held])
+            held = Held(self._held, self._X_GO)
+        else:
+            self._X_GO = None
+        return SceneState(self._scenario, poses, observation.q, observation.opening, held)
 
-    def _held_name(self, observation: Observation, X_WG: SE3, is_closing: bool) -> str | None:
+    def _poses(self, observation: Observation) -> dict[str, SE3]:
+        """Every body that is seen, or was a moment ago."""
+        t, known = observation.t, self._known
+        for name, X_WO in observation.poses.items():
+            sighting = self._lying.setdefault(name, Sighting())
+            known[name] = (t, sighting.see(X_WO, at_rest(observation.velocities[name])))
+        for name in [name for name, (seen, _) in known.items() if t - seen > REMEMBERED]:
+            del known[name]
+        return {name: known[name][1] for name in self._declared.bodies if name in known}
+
+    def _seen_in_hand(self, name: str, observation: Observation, X_WG: SE3) -> SE3 | None:
+        """X_GO of a held body: by where the hand was when the body was seen; as before while it is out of sight."""
+        if name not in observation.poses:
+            return self._X_GO
+        seen_at = observation.seen_at.get(name)
+        X_WG_then = X_WG if seen_at is None else self._hand_at(seen_at)
+        return self._in_hand.see(X_WG_then.inverse() * observation.poses[name], is_at_rest=True)
+
+    def _remember_hand(self, t: float, X_WG: SE3) -> None:
+        self._hands.append((t, X_WG))
+        while self._hands[0][0] < t - OLDEST:
+            self._hands.popleft()
+
+    def _hand_at(self, t: float) -> SE3:
+        """Where the hand was, between two looks at it."""
+        later = next((k for k, (then, _) in enumerate(self._hands) if then >= t), len(self._hands) - 1)
+        (t_b, X_b), (t_a, X_a) = self._hands[later], self._hands[max(later - 1, 0)]
+        share = 1.0 if t_b <= t_a else min(max((t - t_a) / (t_b - t_a), 0.0), 1.0)
+        return SE3.Interpolate(X_a, X_b, share)
+
+    def _look_at_regions(self, regions: Mapping[str, SE3]) -> None:
+        """Regions that stand elsewhere than declared are believed where they are seen."""
+        if regions == self._regions:
+            return
+        self._regions = regions
+        declared = self._declared.regions
+        moved = {name: replace(declared[name], X_WR=X_WR) for name, X_WR in regions.items()}
+        self._scenario = replace(self._declared, regions={**declared, **moved})
+
+    def _held_name(self, observation: Observation, X_WG: SE3, poses: Mapping[str, SE3], is_closing: bool) -> str | None:
         if not is_closing or observation.grip_force < GRIP_FORCE:
             return None
         if abs(observation.opening_velocity) > FINGERS_AT_REST and self._held is None:
             return None
         pads = X_WG.act(np.array([0.0, 0.0, -PAD_DEPTH]))
-        gaps = {
-            name: distance_to(self._scenario.bodies[name].shape, X_WO.actInv(pads))
-            for name, X_WO in observation.poses.items()
-        }
+        bodies = self._declared.bodies
+        gaps = {name: distance_to(bodies[name].shape, X_WO.actInv(pads)) for name, X_WO in poses.items()}
         if not gaps:
             return None
         if self._held is not None and gaps.get(self._held, np.inf) < KEEP_REACH:

@@ -8,8 +8,9 @@ from bt_tamp.executive.agenda import Agenda
 from bt_tamp.executive.belief import Belief
 from bt_tamp.executive.mission import Mission, mission, planning
 from bt_tamp.executive.plan_node import Planner, PlanNode
+from bt_tamp.executive.seams import REAL, Seams
 from bt_tamp.options import RunOptions
-from planner.motion.motion_planner import MotionPlanner, MotionSettings
+from planner.motion.motion_planner import MotionSettings
 from planner.refinement import Work
 from planner.search_then_sample import PlanSettings, SearchThenSample
 from planner.task.facts import goal_facts
@@ -19,6 +20,7 @@ from planner.task.pyperplan_ import PyperplanPlanner
 from planner.task.symbols import Fact
 from scenarios.scenario import Scenario
 from sim.bullet import BulletPlant
+from sim.disturbance import DisturbedPlant
 from sim.robot import RobotModel
 from sim.scene import SceneState
 from skills.catalogue import domain_path, skills
@@ -38,7 +40,7 @@ TREE_EVERY = 10
 class Machine:
     """A wired run, ready to be stepped."""
 
-    plant: BulletPlant
+    plant: BulletPlant | DisturbedPlant
     robot: RobotModel
     belief: Belief
     context: SkillContext
@@ -48,29 +50,43 @@ class Machine:
 
 
 def build(
-    scenario: Scenario, options: RunOptions, report: Callable[..., None], tree_changed: Callable[[str], None]
+    scenario: Scenario,
+    options: RunOptions,
+    report: Callable[..., None],
+    tree_changed: Callable[[str], None],
+    seams: Seams = REAL,
 ) -> Machine:
     """Everything that a run of `scenario` needs. `report(kind, **data)` takes events; `tree_changed(why)` is told of
-    every rebuilt tree. Raises PddlError for hand-written PDDL that does not fit the scene."""
+    every rebuilt tree; `seams`: what takes the place of the real parts. Raises PddlError for hand-written PDDL that
+    does not fit the scene."""
     robot = RobotModel(scenario.robot.model, scenario.robot.X_WB)
     contact = contact_settings(options)
-    thinker = build_planner(scenario, options, robot, report)
+    thinker = build_planner(scenario, options, robot, report, seams)
     planner, goal = thinker.planner, thinker.goal
 
-    plant = BulletPlant(scenario, robot, window=options.window)
+    plant = seams.plant(BulletPlant(scenario, robot, window=options.window))
     belief = Belief(scenario, robot)
     observation = plant.observe()
     context = SkillContext(
         robot=robot,
-        controller=ArmController(robot, period=CONTROL_EVERY * plant.timestep),
+        controller=ArmController(robot, period=CONTROL_EVERY * plant.timestep, solver=seams.solver),
         grip=GripDriver(robot.gripper),
         observation=observation,
         scene=belief.update(observation, is_closing=False),
         refine=lambda action: planner.refine(action, context.scene),
         contact_mode=contact.mode,
+        is_watchful=options.replan,
         report=report,
     )
-    agenda = Agenda(goal, thinker.skills, planner.search.facts, tree_changed, planner.search.learn_success)
+    agenda = Agenda(
+        goal,
+        thinker.skills,
+        planner.search.facts,
+        tree_changed,
+        planner.search.learn_success,
+        scenario.late,
+        options.replan,
+    )
     tree = mission(agenda, context, planning(LiftOff(context), PlanNode(planner, agenda, context)))
     return Machine(plant, robot, belief, context, agenda, planner, tree)
 
@@ -84,12 +100,19 @@ class Thinker:
     goal: frozenset[Fact]
 
 
-def build_planner(scenario: Scenario, options: RunOptions, robot: RobotModel, report: Callable[..., None]) -> Thinker:
+def build_planner(
+    scenario: Scenario,
+    options: RunOptions,
+    robot: RobotModel,
+    report: Callable[..., None],
+    seams: Seams = REAL,
+) -> Thinker:
     """What plans for `scenario`. Raises PddlError for hand-written PDDL that does not fit, ValueError for options."""
     work = Work()
-    motion = MotionPlanner(robot, options.seed, motion_settings(options), work)
+    motion = seams.motion(robot, options.seed, motion_settings(options), work)
     primitives = skills(Toolkit(robot, motion, contact_settings(options)))
-    task_planner = PyperplanPlanner(options.search or ("astar-hmax" if options.preset == "paper" else "auto"))
+    search = options.search or ("astar-hmax" if options.preset == "paper" else "auto")
+    task_planner = seams.task_planner(PyperplanPlanner(search))
     settings = PlanSettings() if options.tries is None else PlanSettings(tries=options.tries)
 
     def tell(kind: str, data: Mapping[str, Any]) -> None:
@@ -102,8 +125,8 @@ def build_planner(scenario: Scenario, options: RunOptions, robot: RobotModel, re
         arities = {name: skill.arity for name, skill in primitives.items()}
         domain, given = read_given(options.domain, options.problem, arities, start)
         goal = given.problem.goal
-    search = SearchThenSample(task_planner, primitives, domain, settings, tell, given)
-    return Thinker(Planner(search, options.seed, work), primitives, goal)
+    loop = SearchThenSample(task_planner, primitives, domain, settings, tell, given)
+    return Thinker(Planner(loop, options.seed, work), primitives, goal)
 
 
 def motion_settings(options: RunOptions) -> MotionSettings:

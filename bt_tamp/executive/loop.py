@@ -10,22 +10,35 @@ from typing import Any
 import numpy as np
 from py_trees.common import Status
 
+from bt_tamp.disturb.driver import Driver
 from bt_tamp.errors import one_line_of
 from bt_tamp.executive.audit import ContactAudit
+from bt_tamp.executive.befallen import Ledger
 from bt_tamp.executive.build import CONTROL_EVERY, TREE_EVERY, Machine, build
 from bt_tamp.executive.force_audit import ForceAudit
+from bt_tamp.executive.plan_node import LOST_PATIENCE
+from bt_tamp.executive.resuming import entering, state_of, take_up
+from bt_tamp.executive.seams import REAL
 from bt_tamp.export.snapshot import Results
 from bt_tamp.options import RunOptions
 from bt_tamp.report.recorder import RunRecorder
 from bt_tamp.report.result import Outcome, RunResult
 from bt_tamp.report.sentences import counted
 from bt_tamp.report.signals import Contact, Reference
+from bt_tamp.report.state import RunState
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
+from sim.disturbance import DisturbedPlant
 from sim.plant import Command
 
 SAMPLE_EVERY = 5
 """Control ticks between two samples of the signals and two looks at the true contacts: 100 Hz."""
+
+BRAKING = 2.0
+"""Simulated seconds that the arm gets to come to rest after an interruption."""
+
+BLIND_PATIENCE = 3.0
+"""Simulated seconds that things get to come to rest once a plan was carried out blindly."""
 
 REST_PATIENCE = 30.0
 """Simulated seconds that things may go on moving once the goal's literals hold."""
@@ -45,6 +58,8 @@ class Tally:
     learned: dict[str, None] = field(default_factory=dict)
     failed: Counter[str] = field(default_factory=Counter)
     reasons: dict[str, str] = field(default_factory=dict)
+    befallen: Ledger = field(default_factory=Ledger)
+    over_since: float | None = None
     started: float = field(default_factory=time.perf_counter)
 
 
@@ -68,9 +83,12 @@ class Ending:
     reason: str
 
 
-def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder) -> RunResult:
-    """Plan and act until the goal is reached or given up. An interruption (Ctrl-C) or an error in our own code ends the
-    run with a result too.
+def run_scenario(
+    scenario: Scenario, options: RunOptions, recorder: RunRecorder, start: RunState | None = None
+) -> RunResult:
+    """Plan and act until the goal is reached or given up. An interruption (Ctrl-C) stops the arm softly; it, or an
+    error in our own code, ends the run with a result too. start: the state in which the scenario is entered, if not
+    afresh.
 
     Raises PddlError for hand-written PDDL that doesn't fit, ValueError for options that don't.
     """
@@ -82,25 +100,37 @@ def run_scenario(scenario: Scenario, options: RunOptions, recorder: RunRecorder)
         if kind == "action_failed":
             tally.failed[data["action"]] += 1
             tally.reasons[data["action"]] = data["reason"]
+        tally.befallen.hear(kind, tally.t, data)
         _report(recorder, tally.t, kind, data, machine.planner.thinking.rounds)
+        if driver is not None:
+            driver.hear(kind, tally.t, data.get("phase", ""), data.get("action", ""))
 
     def tree_changed(why: str) -> None:
+        tally.befallen.hear("rebuilt", tally.t, {})
         recorder.tree(machine.mission.root, why)
 
-    machine = build(scenario, options, report, tree_changed)
+    driver = None
+    if options.disturb or scenario.disturbances:
+        driver = Driver(scenario.disturbances, options.disturb, options.seed, report)
+    seams = driver.seams if driver else REAL
+    machine = build(scenario, options, report, tree_changed, seams if start is None else entering(start, seams))
+    if driver is not None:
+        driver.bind(machine)
     audits = Audits.of(machine)
     report("run_started", scene=scenario.name, seed=scenario.seed)
     try:
+        if start is not None:
+            take_up(machine, start)
         ending = _run(machine, options, recorder, audits, tally)
     except KeyboardInterrupt:
-        ending = Ending("interrupted", "the run was interrupted")
+        ending = Ending("interrupted", _brake(machine, recorder, audits, tally))
     except Exception as error:  # Whatever it is: the run's folder is worth most when something went wrong.
         ending = Ending("crashed", f"{type(error).__name__}: {one_line_of(error)}")
         recorder.crash(traceback.format_exc())
     result = _result(machine, scenario, ending, audits, tally)
     recorder.tree(machine.mission.root, "end", tally.results)
     report("run_ended", outcome=result.outcome, sentence=result.reason)
-    recorder.finish(result)
+    recorder.finish(result, state_of(machine))
     machine.plant.close()
     return result
 
@@ -121,6 +151,22 @@ def _run(
                 return ending
         act(machine, recorder, audits, tally, n)
         n += 1
+
+
+def _brake(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally) -> str:
+    """Bring the arm to rest, for a bounded time; how that went, in a sentence. A second one ends it at once."""
+    try:
+        machine.agenda.act.stop(Status.INVALID)
+        machine.context.controller.hold()
+        for n in range(round(BRAKING / (CONTROL_EVERY * machine.plant.timestep))):
+            machine.context.observation = machine.plant.observe()
+            tally.t = machine.context.observation.t
+            act(machine, recorder, audits, tally, n)
+            if machine.context.controller.finished:
+                return "the run was interrupted, the arm brought to rest"
+    except KeyboardInterrupt:
+        return "the run was interrupted twice, and ended at once"
+    return f"the run was interrupted, and the arm did not come to rest within {BRAKING:g} s"
 
 
 def look(machine: Machine, tally: Tally, n: int) -> None:
@@ -161,7 +207,9 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
         wanted = reference.force if reference else 0.0
         q_ref = reference.trajectory.at(controller.time_in_reference)[0] if reference else observation.q
         p_ref = machine.robot.X_WG(q_ref).translation if wanted else None
-        recorder.sample(observation, Reference(q_ref, p_ref, wanted), force)
+        # What is recorded is what was, not what was sensed.
+        truth = machine.plant.truth() if isinstance(machine.plant, DisturbedPlant) else observation
+        recorder.sample(truth, Reference(q_ref, p_ref, wanted), force)
         contacts = machine.plant.contacts()
         running = str(machine.agenda.running or "planning")
         audits.contacts.look(observation.t, contacts, context, running)
@@ -180,6 +228,16 @@ def _ending(machine: Machine, options: RunOptions, tally: Tally) -> Ending | Non
         return Ending("goal_reached", "every literal of the goal holds")
     if verdict is not None:
         return Ending("proven_infeasible" if verdict.verdict == "proven" else "no_plan", verdict.reason)
+    if not options.replan:
+        blind = _blind_ending(machine, tally)
+        if blind is not None:
+            return blind
+    waits = machine.mission.goal.waits
+    if waits is not None and waits[1] and machine.context.observation.t - waits[0] > LOST_PATIENCE:
+        names = ", ".join(waits[1])
+        return Ending(
+            "no_plan", f"{names} {'is' if len(waits[1]) == 1 else 'are'} nowhere to be seen; the rest is done"
+        )
     restless = machine.mission.goal.restless
     if restless is not None and machine.context.observation.t - restless[0] > REST_PATIENCE:
         return Ending("gave_up", f"{', '.join(restless[1])} did not come to rest within {REST_PATIENCE:g} s")
@@ -190,6 +248,19 @@ def _ending(machine: Machine, options: RunOptions, tally: Tally) -> Ending | Non
     if machine.context.observation.t > options.max_sim_time:
         return Ending("gave_up", f"{options.max_sim_time:g} s of simulated time have passed")
     return None
+
+
+def _blind_ending(machine: Machine, tally: Tally) -> Ending | None:
+    """The end of a run that carries out its first plan whatever it sees."""
+    agenda, context = machine.agenda, machine.context
+    if context.failure is not None:
+        return Ending("gave_up", f"open loop: {context.failure.action} failed: {context.failure.reason}")
+    if not agenda.is_over:
+        return None
+    tally.over_since = context.observation.t if tally.over_since is None else tally.over_since
+    if context.observation.t - tally.over_since < BLIND_PATIENCE:
+        return None
+    return Ending("gave_up", "open loop: the plan was carried out, and the goal does not hold")
 
 
 def _most_often(tally: Tally) -> str:
@@ -204,7 +275,10 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audits: Audits
     context, agenda, thinking = machine.context, machine.agenda, machine.planner.thinking
     known = agenda.facts(context.scene)
     held = context.scene.held
-    places = {name: place_of(context.scene, name) or "floor" for name in scenario.bodies}
+    places = {
+        name: (place_of(context.scene, name) or "floor") if name in context.scene.poses else "nowhere"
+        for name in scenario.bodies
+    }
     if held is not None:
         places[held.name] = "hand"
     return RunResult(
@@ -229,6 +303,7 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audits: Audits
         pressed=audits.forces.found,
         peak_rss_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         energy_j=tally.energy_j,
+        disturbances=tally.befallen.found,
     )
 
 

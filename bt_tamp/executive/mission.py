@@ -51,7 +51,8 @@ def mission(agenda: Agenda, context: SkillContext, plan: Behaviour) -> Mission:
 class GoalReached(Behaviour):
     """Do all goal literals hold, everything at rest, for half a second, the running action at its end?
 
-    `restless`: since when (s) the literals hold and something moves, and what; None otherwise.
+    `restless`: since when (s) the literals hold and something moves, and what; None otherwise. `waits`: the same
+    for all that can be worked on being done, and bodies that are nowhere to be seen.
     """
 
     def __init__(self, agenda: Agenda, context: SkillContext) -> None:
@@ -60,11 +61,15 @@ class GoalReached(Behaviour):
         self._since: float | None = None
         self._told = False
         self.restless: tuple[float, tuple[str, ...]] | None = None
+        self.waits: tuple[float, tuple[str, ...]] | None = None
 
     def update(self) -> Status:
         context = self._context
         now = context.observation.t
-        missing = self._agenda.goal - self._agenda.facts(context.scene)
+        self._agenda.look_out(context.scene)
+        facts = self._agenda.facts(context.scene)
+        missing = self._agenda.goal - facts
+        self._look_for_the_missing(now, missing, facts)
         if missing or not self._agenda.is_between_actions:
             self._since = self.restless = None
             self._told = False
@@ -84,6 +89,14 @@ class GoalReached(Behaviour):
         if self._since is None:
             self._since = now
         return Status.SUCCESS if now - self._since >= GOAL_TIME else Status.FAILURE
+
+    def _look_for_the_missing(self, now: float, missing: frozenset[Fact], facts: frozenset[Fact]) -> None:
+        scene = self._context.scene
+        if not missing or not self._agenda.pursued(scene) <= facts:
+            self.waits = None
+            return
+        since = self.waits[0] if self.waits else now
+        self.waits = (since, self._agenda.missing(scene))
 
 
 class PlanStillGood(Behaviour):

@@ -13,7 +13,7 @@ from planner.failure import ExecutionFailure, RefinementFailure
 from planner.refinement import Refinement, Work
 from planner.search_then_sample import NoPlan, SearchThenSample, Solution
 from planner.task.symbols import GroundAction
-from sim.scene import SceneState
+from sim.scene import SceneState, pose_distance
 from skills.context import SkillContext
 
 COST = {"checks": 5e-6, "exact_checks": 2e-5, "ik": 1e-4, "expansions": 1e-4}
@@ -21,6 +21,12 @@ COST = {"checks": 5e-6, "exact_checks": 2e-5, "ik": 1e-4, "expansions": 1e-4}
 
 PATIENCE = 2.0
 """Seconds for which planning waits, at most, until what falls or rolls has come to rest."""
+
+LOST_PATIENCE = 15.0
+"""Seconds for which the arm waits, when it can't go on, for what is nowhere to be seen to turn up again."""
+
+MOVED = 0.01
+"""Metres by which something must have moved meanwhile for a scene to be planned in again."""
 
 
 @dataclass
@@ -60,7 +66,7 @@ class Planner:
     def plan(self, scene: SceneState, agenda: Agenda) -> Solution | NoPlan:
         """A plan from the believed scene, refined whole, or why there is none."""
         with self.thinking as thinking:
-            outcome = self.search.plan(scene, agenda.goal, self._rng, thinking.work)
+            outcome = self.search.plan(scene, agenda.pursued(scene), self._rng, thinking.work)
         thinking.rounds += outcome.rounds
         thinking.plans += 1
         return outcome
@@ -76,7 +82,8 @@ class Planner:
 class PlanNode(Behaviour):
     """Plans once everything is at rest, lets the simulated time that this costs pass, then puts the plan in force.
 
-    Fails when there is no plan; `planner.thinking.verdict` says why.
+    Fails when there is no plan; `planner.thinking.verdict` says why. While something is nowhere to be seen, it waits
+    for that to turn up first.
     """
 
     def __init__(self, planner: Planner, agenda: Agenda, context: SkillContext) -> None:
@@ -86,24 +93,43 @@ class PlanNode(Behaviour):
         self._since = 0.0
         self._ready_at = 0.0
         self._why = "planned"
+        self._waits_for: tuple[str, ...] = ()
+        self._scene = context.scene
 
     def initialise(self) -> None:
         self._outcome = None
+        self._waits_for = ()
         self._since = self._context.observation.t
 
     def update(self) -> Status:
         context, thinking = self._context, self._planner.thinking
+        if self._waits_for:
+            if self._agenda.missing(context.scene) == self._waits_for and not self._is_out_of_patience():
+                return Status.RUNNING
+            if self._agenda.missing(context.scene) != self._waits_for:
+                self._outcome, self._waits_for = None, ()
         if self._outcome is None:
             observation = context.observation
             if moving(observation) and observation.t - self._since < PATIENCE:
                 return Status.RUNNING
             self._take_in_failure()
             before = thinking.simulated_cost()
+            self._scene = context.scene
             self._outcome = self._planner.plan(context.scene, self._agenda)
             self._ready_at = context.observation.t + thinking.simulated_cost() - before
         if context.observation.t < self._ready_at:
             return Status.RUNNING
         if isinstance(self._outcome, NoPlan):
+            if self._has_moved(context.scene):
+                self._outcome = None
+                return Status.RUNNING
+            missing = self._agenda.missing(context.scene)
+            if missing and not self._is_out_of_patience():
+                self._waits_for = missing
+                context.report("missing", bodies=list(missing))
+                return Status.RUNNING
+            if missing:
+                self._outcome = nowhere_to_be_seen(missing, self._outcome)
             thinking.verdict = self._outcome
             self.feedback_message = self._outcome.reason
             return Status.FAILURE
@@ -118,6 +144,16 @@ class PlanNode(Behaviour):
         self._why = "replanned"
         return Status.SUCCESS
 
+    def _has_moved(self, scene: SceneState) -> bool:
+        """Is the scene no longer the one that was planned in? Then what was found says nothing about it."""
+        before = self._scene.poses
+        if before.keys() != scene.poses.keys():
+            return True
+        return any(pose_distance(before[name], X_WO)[0] > MOVED for name, X_WO in scene.poses.items())
+
+    def _is_out_of_patience(self) -> bool:
+        return self._context.observation.t - self._since > LOST_PATIENCE
+
     def _take_in_failure(self) -> None:
         context = self._context
         failure = context.failure
@@ -130,3 +166,10 @@ class PlanNode(Behaviour):
             context.report("replan", reason=reason)
         self._agenda.drop()
         context.failure = None
+
+
+def nowhere_to_be_seen(missing: tuple[str, ...], outcome: NoPlan) -> NoPlan:
+    """There is no plan, and this is missing: no proof, for it may turn up."""
+    names = ", ".join(missing)
+    reason = f"{names} {'is' if len(missing) == 1 else 'are'} nowhere to be seen; {outcome.reason}"
+    return NoPlan("budget", reason, outcome.culprits.union(missing), outcome.rounds)

@@ -13,8 +13,9 @@ REST_TURN = 0.2
 
 def moving(observation: Observation) -> list[str]:
     """Names of the bodies that are not at rest."""
-    return [name for name, V_WO in observation.velocities.items() if _moves(V_WO)]
+    return [name for name, V_WO in observation.velocities.items() if not at_rest(V_WO)]
 
 
-def _moves(V_WO: np.ndarray) -> bool:
-    return math.hypot(*V_WO[:3]) > REST_SPEED or math.hypot(*V_WO[3:]) > REST_TURN
+def at_rest(V_WO: np.ndarray) -> bool:
+    """Is something with this velocity (6,) at rest?"""
+    return math.hypot(*V_WO[:3]) <= REST_SPEED and math.hypot(*V_WO[3:]) <= REST_TURN

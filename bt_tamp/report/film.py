@@ -78,7 +78,8 @@ class Filming:
         """The picture (HEIGHT, WIDTH, 3) uint8 of a shot."""
         signals = self.recording.signals
         row = int(np.clip(np.searchsorted(signals.t, shot.t + 1e-9) - 1, 0, len(signals.t) - 1))
-        poses = dict(zip(signals.bodies.tolist(), signals.poses[row], strict=True))
+        seen = zip(signals.bodies.tolist(), signals.poses[row], strict=True)
+        poses = {name: pose for name, pose in seen if np.isfinite(pose[0])}
         picture = self._renderer.picture(signals.q[row], float(signals.opening[row]), poses)
         force = float(signals.force[row])
         words = Words(

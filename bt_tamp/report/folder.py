@@ -15,11 +15,12 @@ RESULT = "result.json"
 EVENTS = "events.jsonl"
 SCENARIO = "scenario.json"
 SIGNALS = "signals.npz"
+STATE = "state.json"
 VIDEO = "video.mp4"
 CRASH = "crash.txt"
 PDDL, PLANS, TREES = "pddl", "plans", "trees"
 
-OWN = (RESULT, EVENTS, SCENARIO, SIGNALS, VIDEO, CRASH, PDDL, PLANS, TREES)
+OWN = (RESULT, EVENTS, SCENARIO, SIGNALS, STATE, VIDEO, CRASH, PDDL, PLANS, TREES)
 """Everything a run writes: what `--force` clears, and nothing else."""
 
 

@@ -8,9 +8,10 @@ import py_trees
 
 from bt_tamp.export.snapshot import Results, TreeNode, snapshot
 from bt_tamp.report.events import Event
-from bt_tamp.report.folder import CRASH, EVENTS, PDDL, PLANS, RESULT, SCENARIO, SIGNALS, TREES, RunFolder
+from bt_tamp.report.folder import CRASH, EVENTS, PDDL, PLANS, RESULT, SCENARIO, SIGNALS, STATE, TREES, RunFolder
 from bt_tamp.report.result import RunResult
 from bt_tamp.report.signals import Contact, Reference, SignalTable
+from bt_tamp.report.state import RunState
 from scenarios.scenario import Scenario
 from sim.plant import Observation
 
@@ -124,10 +125,11 @@ class RunRecorder:
         """An error in our own code ended the run; `trace` is its traceback."""
         self._text(CRASH, trace)
 
-    def finish(self, result: RunResult) -> None:
-        """The run has ended: everything is written, `result.json` last."""
+    def finish(self, result: RunResult, state: RunState) -> None:
+        """The run has ended, things standing as in `state`: everything is written, `result.json` last."""
         self.result = result
         self._save_signals()
+        self._text(STATE, state.to_json())
         self._text(RESULT, result.to_json())
 
     def close(self) -> None:

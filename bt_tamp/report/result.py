@@ -47,13 +47,26 @@ class PressedMotion:
 
 
 @dataclass(frozen=True)
+class Befallen:
+    """A disturbance: when (s), of which class ("declared" for the scene's own), what was done, in which phase; and what
+    the run answered first (`refined_again`, `action_failed`, `replan`, `rebuilt`, or nothing), after how many s."""
+
+    t: float
+    name: str
+    sentence: str
+    phase: str
+    answer: str = ""
+    answered_after_s: float | None = None
+
+
+@dataclass(frozen=True)
 class RunResult:
     """One run. Field names are the keys of `result.json`.
 
     goal: literal → does it hold at the end. plan: actions of the last plan; executed: actions that
-    were done, in order. learned: sentences. places: where each movable body lies at the end (a
-    region's name, "table", "hand" or "floor"). reason: why it ended so, one sentence.
-    planning_cpu_s counts all rounds and re-refinements, children included. robot_s is simulated,
+    were done, in order. disturbances: what befell it. learned: sentences. places: where each movable
+    body lies at the end (a region's name, "table", "hand", "floor" or "nowhere"). reason: why it ended so,
+    one sentence. planning_cpu_s counts all rounds and re-refinements, children included. robot_s is simulated,
     wall_s real time. energy_j is ∫|τ·q̇|dt. reproducible: no wall-clock watchdog cut anything short.
     """
 
@@ -78,6 +91,7 @@ class RunResult:
     pressed: tuple[PressedMotion, ...] = ()
     peak_rss_mb: float = 0.0
     energy_j: float = 0.0
+    disturbances: tuple[Befallen, ...] = ()
     reproducible: bool = True
 
     @property
@@ -95,6 +109,7 @@ class RunResult:
             data: dict[str, Any] = json.loads(text)
             data["unintended_contacts"] = tuple(UnintendedContact(**c) for c in data["unintended_contacts"])
             data["pressed"] = tuple(PressedMotion(**motion) for motion in data["pressed"])
+            data["disturbances"] = tuple(Befallen(**one) for one in data.get("disturbances", ()))
             for key in ("plan", "executed", "learned"):
                 data[key] = tuple(data[key])
             return RunResult(**data)

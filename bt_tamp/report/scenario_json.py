@@ -22,6 +22,7 @@ def scenario_to_json(scenario: Scenario) -> str:
         "name": scenario.name,
         "seed": scenario.seed,
         "goal": scenario.goal,
+        "late": sorted(scenario.late),
         "robot": _plain(scenario.robot),
         "table": _plain(scenario.table),
         "regions": {name: _plain(region) for name, region in scenario.regions.items()},
@@ -46,6 +47,7 @@ def scenario_from_json(text: str) -> Scenario:
             fixtures={name: Fixture(**_revived(record)) for name, record in data["fixtures"].items()},
             bodies={name: Body(**_revived(record)) for name, record in data["bodies"].items()},
             goal=data["goal"],
+            late=frozenset(data.get("late", ())),
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"not a recorded scenario: {error!r}") from None

@@ -31,6 +31,10 @@ def sentence(event: Event) -> str | None:
             return f"{data['action']} slips: pressed with {data['force']:.0f} N from now on"
         case "replan":
             return f"planning again: {data['reason']}"
+        case "disturbed":
+            return f"disturbance: {data['sentence']}"
+        case "missing":
+            return f"waiting for {', '.join(data['bodies'])} to turn up again"
         case "waiting":
             return f"waiting for {', '.join(data['bodies'])} to come to rest"
         case "goal_reached":

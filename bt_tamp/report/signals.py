@@ -3,7 +3,7 @@
 `signals.npz` holds, for n samples, m contacts, b bodies (times in s, simulated; frame W; metres, N, Nm, rad):
 t (n,); q, v, tau, q_ref (n,7); opening, grip_force (n,); wrist (n,6) force before torque, in the flange's
 frame; p_ref (n,3) set-point of the tool while in contact, else NaN; force, force_ref (n,) measured and
-wanted contact force; poses (n,b,7) position and quaternion xyzw; bodies (b,) their names;
+wanted contact force; poses (n,b,7) position and quaternion xyzw, NaN for what isn't there; bodies (b,) their names;
 contact_t (m,); contact_pair (m,2) indices into contact_names; contact_p, contact_f (m,3) point, and force on
 the pair's first.
 """
@@ -74,7 +74,8 @@ class SignalTable:
         row[39:42] = NO_POINT if reference.p_WG is None else reference.p_WG
         start = _FIXED
         for name in self.bodies:
-            row[start : start + 7] = pin.SE3ToXYZQUAT(observation.poses[name])
+            X_WO = observation.poses.get(name)
+            row[start : start + 7] = np.nan if X_WO is None else pin.SE3ToXYZQUAT(X_WO)
             start += 7
         self._count += 1
 

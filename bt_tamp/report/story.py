@@ -108,6 +108,14 @@ class _Teller:
         reason = "" if data["reason"] == self._last_failure else f", because {data['reason']}"
         self._say(f"The plan was dropped{reason}, and a new one sought from what was observed then.")
 
+    def _disturbed(self, event: Event, data: Any) -> None:
+        meanwhile = "" if data["phase"] == "planning" else f", during {data['phase']!r}"
+        self._say(f"DISTURBANCE{meanwhile}: {data['sentence']}.", f"{event.t:7.1f} s          ")
+
+    def _missing(self, event: Event, data: Any) -> None:
+        names = ", ".join(data["bodies"])
+        self._say(f"The arm waited for {names} to turn up again.", f"{event.t:7.1f} s          ")
+
     def _waiting(self, event: Event, data: Any) -> None:
         self._say(
             f"Everything lay where it should; {', '.join(data['bodies'])} still moved.", f"{event.t:7.1f} s          "

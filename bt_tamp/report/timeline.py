@@ -8,7 +8,16 @@ from bt_tamp.report.events import Event
 from bt_tamp.report.sentences import sentence
 
 TOLD = frozenset(
-    {"refinement_failed", "learned", "action_failed", "refined_again", "replan", "goal_reached", "run_ended"}
+    {
+        "disturbed",
+        "refinement_failed",
+        "learned",
+        "action_failed",
+        "refined_again",
+        "replan",
+        "goal_reached",
+        "run_ended",
+    }
 )
 """Events at which the film stands still so that their sentences can be read."""
 

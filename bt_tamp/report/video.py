@@ -70,7 +70,8 @@ def render_run(folder: Path, out: Path | None = None, progress: Callable[[int, i
 def show_scene(scenario: Scenario, out: Path) -> Path:
     """Write a picture (PNG, 1280×720) of a scene as it stands at the start; where it lies."""
     robot = RobotModel(scenario.robot.model, scenario.robot.X_WB)
-    poses = {name: pin.SE3ToXYZQUAT(body.X_WO) for name, body in scenario.bodies.items()}
+    there = (body for body in scenario.bodies.values() if body.name not in scenario.late)
+    poses = {body.name: pin.SE3ToXYZQUAT(body.X_WO) for body in there}
     with Renderer(scenario) as renderer, replacing(out) as partial:
         picture = renderer.picture(scenario.robot.q0, robot.gripper.stroke, poses)
         Image.fromarray(picture).save(partial, format="PNG", optimize=True)

@@ -16,6 +16,7 @@ from skills.control.contact import ContactWrench, Touch
 from skills.control.force import ForceLoop, smooth_step
 from skills.control.limits import ApproachLimit, Row
 from skills.control.momentum import MomentumObserver
+from skills.control.osqp_ import Solver
 from skills.control.reference import Course, Reference, near_contact
 from skills.control.safety import Collision, ForceTooHigh, Guard, SafetyLimits, Stop
 from skills.control.state import ArmState, Target, measure, target_at
@@ -95,12 +96,13 @@ class ArmController:
         robot: RobotModel,
         period: float = 0.002,
         safety: SafetyLimits | None = None,
+        solver: Solver | None = None,
     ) -> None:
         self._unloaded = self._robot = robot
         self._period = period
         self._data = robot.data()
         self.lap: Callable[[str], None] = nobody
-        self._qp = TorqueQP(robot, period, lambda part: self.lap(part))
+        self._qp = TorqueQP(robot, period, lambda part: self.lap(part), solver)
         self._observer = MomentumObserver(period)
         self._guard = Guard(safety or SafetyLimits(), robot.tau_max, period)
         self._compensated = COMPENSATED * robot.tau_max

@@ -7,7 +7,7 @@ active the optimum is that of P x = −g, found by Cholesky, and OSQP is left al
 """
 
 import math
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import osqp
@@ -45,6 +45,20 @@ class _LeanOSQP(osqp.OSQP):
         self._solver.solve()
         x[:] = self._solver.solution.x
         return self._solver.info.status
+
+
+class Solver(Protocol):
+    """Solves the controller's QP."""
+
+    def solve(
+        self,
+        P: np.ndarray,
+        g: np.ndarray,
+        bounds: tuple[np.ndarray, np.ndarray],
+        rows: tuple[np.ndarray, np.ndarray, np.ndarray],
+    ) -> tuple[np.ndarray, str]:
+        """X (n,) and a status in words; x means nothing unless that is "solved"."""
+        ...
 
 
 class Workspace:

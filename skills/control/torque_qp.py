@@ -14,7 +14,7 @@ from numba import njit
 
 from sim.robot import RobotModel
 from skills.control.limits import FREE, AccelerationLimit, Bound, PositionLimit, Row, TorqueLimits, VelocityLimit
-from skills.control.osqp_ import SOLVED, Workspace
+from skills.control.osqp_ import SOLVED, Solver, Workspace
 from skills.control.state import ArmState
 from skills.control.tasks import Task
 
@@ -50,10 +50,20 @@ def nobody(part: str) -> None:
 
 
 class TorqueQP:
-    """Solves one tick after the other; counts `fallbacks` and `torque_limit_violations` (of the QP's own output)."""
+    """Solves one tick after the other; counts `fallbacks` and `torque_limit_violations` (of the QP's own output).
 
-    def __init__(self, robot: RobotModel, period: float, lap: Callable[[str], None] = nobody, **settings: float):
-        self._workspace = Workspace(7, 7 + SPARE_ROWS, **settings)
+    `solver` takes the place of OSQP with `settings`.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        period: float,
+        lap: Callable[[str], None] = nobody,
+        solver: Solver | None = None,
+        **settings: float,
+    ):
+        self._workspace = solver or Workspace(7, 7 + SPARE_ROWS, **settings)
         self._bounds: tuple[Bound, ...] = (
             AccelerationLimit(HARDEST * robot.a_max),
             VelocityLimit(robot.v_max, robot.a_max, period),

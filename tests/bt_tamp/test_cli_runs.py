@@ -5,6 +5,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bt_tamp.cli import COMMANDS, main
@@ -189,7 +190,12 @@ def test_an_interrupted_run_says_so_in_a_whole_folder(tmp_path: Path) -> None:
     assert process.returncode == 130
     assert complaints == ""
     assert str(tmp_path / "run") in said
-    assert json.loads((tmp_path / "run" / "result.json").read_text())["outcome"] == "interrupted"
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert result["outcome"] == "interrupted"
+    assert "brought to rest" in result["reason"]
+    with np.load(tmp_path / "run" / "signals.npz") as signals:
+        assert np.abs(signals["v"][-1]).max() < 0.05
+    assert (tmp_path / "run" / "state.json").exists()
     assert (tmp_path / "run" / "signals.npz").exists()
 
 

@@ -15,6 +15,7 @@ from planner.task.symbols import Fact, GroundAction, Step, TaskPlan, resume_at
 
 TICK = 0.02
 AT = {place: Fact("at", (place,)) for place in ("start", "a", "b", "c")}
+EMPTY = SimpleNamespace(poses={}, scenario=SimpleNamespace(bodies={}))
 
 
 def go(origin, place):
@@ -80,7 +81,7 @@ class World:
         self.facts = frozenset(AT[place] for place in facts)
         self.route, self.fails, self.ticks, self.retract, self.log = ROUTE, False, 3, 0, []
         self.speed = 0.0
-        context = SimpleNamespace(scene=None, failure=None, report=lambda *_, **__: None, observation=None)
+        context = SimpleNamespace(scene=EMPTY, failure=None, report=lambda *_, **__: None, observation=None)
         context.fail = lambda failure: setattr(context, "failure", context.failure or failure)
         self.context = context
         steps = {step.action: step for step in ROUTE.steps}

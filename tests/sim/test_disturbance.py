@@ -5,26 +5,25 @@ import pinocchio as pin
 import pytest
 from pinocchio import SE3
 
-from scenarios.scenario import Body, RobotPlacement, Scenario, Table
+from scenarios.scenario import Body, Region, RobotPlacement, Scenario, Table
 from scenarios.shapes import Box
 from sim.bullet import BulletPlant
-from sim.disturbance import (
-    DisturbedPlant,
-    Fault,
+from sim.disturbance import DisturbedPlant, Fault
+from sim.plant import Command, GripCommand
+from sim.robot import RobotModel
+from sim.robot_faults import JointFriction, Push, WeakGrip
+from sim.sensor_faults import (
     ForceBias,
     ForceDelay,
     ForceFrozen,
     ForceMissing,
     ForceNoise,
     JointDelay,
-    JointFriction,
     PoseDelay,
     PoseMissing,
     PoseNoise,
-    Push,
 )
-from sim.plant import Command, GripCommand
-from sim.robot import RobotModel
+from sim.world_faults import BinShifted, Brought, Moved, Slippery, TakenAway
 
 IDLE = GripCommand(0.0, 80.0)
 HOME = np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 80.0, 0.0])
@@ -185,7 +184,7 @@ def test_a_push_on_the_elbow_turns_the_shoulder(make):
 
 
 def test_what_is_no_fault_of_sensors_or_world_is_refused(make):
-    with pytest.raises(TypeError, match="neither a fault of sensors nor of the world"):
+    with pytest.raises(TypeError, match="neither a fault of sensors, of commands nor of the world"):
         make(Fault())
 
 
@@ -193,3 +192,59 @@ def test_faults_are_plain_values():
     assert ForceNoise(0.3) == ForceNoise(0.3)
     assert replace(ForceBias((1.0, 0.0, 0.0)), start=2.0).holds_at(2.0)
     assert not ForceBias((1.0, 0.0, 0.0), start=2.0).holds_at(1.999)
+
+
+def test_a_moved_body_lies_elsewhere_and_what_is_taken_is_gone_until_it_is_brought(make):
+    there = SE3(np.eye(3), np.array([0.5, 0.3, 2.0]))
+    plant = make(
+        Moved("stone", there, start=0.01),
+        TakenAway("feather", start=0.01),
+        Brought("feather", there * SE3(np.eye(3), np.array([0.0, 0.0, 1.0])), start=0.02),
+    )
+    seen = watched(plant, 0.03)
+    np.testing.assert_allclose(seen[11].poses["stone"].translation, there.translation, atol=1e-4)
+    assert [index for index, o in enumerate(seen) if "feather" not in o.poses] == list(range(11, 21))
+    np.testing.assert_allclose(seen[21].poses["feather"].translation, [0.5, 0.3, 3.0], atol=1e-4)
+
+
+def test_a_deed_is_done_once_however_long_its_fault_holds(make):
+    plant = make(Moved("stone", SE3(np.eye(3), np.array([0.5, 0.3, 2.0]))))
+    assert watched(plant, 0.3)[-1].poses["stone"].translation[2] < 1.9
+
+
+def test_a_weak_grip_lets_the_fingers_be_pushed(make):
+    strong = watched(make(), 0.02)[-1].grip_force
+    assert strong == pytest.approx(watched(make(WeakGrip(0.5, start=1.0)), 0.02)[-1].grip_force)
+    plant = make(WeakGrip(0.5))
+    for _ in range(400):
+        plant.apply(Command(np.zeros(7), GripCommand(-0.1, 80.0)))
+        plant.step()
+    assert plant.observe().grip_force < 1.0
+
+
+def test_what_turned_slippery_is_itself_again_afterwards(make):
+    frictions = []
+    plant = make(Slippery("stone", 0.01, start=0.01, end=0.02))
+    plant._plant.set_friction = lambda name, friction: frictions.append((name, friction))
+    watched(plant, 0.04)
+    assert frictions == [("stone", 0.01), ("stone", 0.5)]
+
+
+def test_a_late_pose_says_when_it_was_true(make):
+    seen = watched(make(PoseDelay(0.02)), 0.05)
+    assert seen[40].seen_at == {"stone": pytest.approx(0.02), "feather": pytest.approx(0.02)}
+
+
+def test_a_shifted_bin_takes_along_what_lies_in_it():
+    region = Region("bin", "bin", (0.3, 0.3, 0.12), 0.01, SE3(np.eye(3), np.array([0.0, 0.7, 0.06])), 0.5)
+    body = Body("egg", Box((0.04, 0.04, 0.04)), 0.1, 0.5, (1.0, 0, 0, 1.0), SE3(np.eye(3), np.array([0.0, 0.7, 0.031])))
+    table = Table((0.8, 0.6, 0.05), SE3(np.eye(3), np.array([0.62, 0.0, 0.025])), 0.3)
+    robot = RobotModel()
+    placed = RobotPlacement(robot.name, SE3.Identity(), HOME)
+    scenario = Scenario("bin", 0, placed, table, {"bin": region}, {}, {"egg": body}, "")
+    plant = DisturbedPlant(BulletPlant(scenario, robot), [BinShifted("bin", (0.05, 0.0, 0.0), start=0.1)])
+    seen = watched(plant, 0.3)
+    assert not seen[50].regions
+    np.testing.assert_allclose(seen[-1].regions["bin"].translation, [0.05, 0.7, 0.06])
+    np.testing.assert_allclose(seen[-1].poses["egg"].translation, [0.05, 0.7, 0.03], atol=2e-3)
+    plant.close()

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from planner.motion.trajectory import Trajectory
-from sim.disturbance import DisturbedPlant, ForceDelay, ForceMissing, ForceNoise
+from sim.disturbance import DisturbedPlant
 from sim.plant import Command
+from sim.sensor_faults import ForceDelay, ForceMissing, ForceNoise
 from skills.control.controller import ArmController
 from skills.control.limits import FREE, ApproachLimit
 from skills.control.reference import Reference

@@ -1,0 +1,87 @@
+"""Sum up what sweeps have stored, by scene and class of disturbance; plots and CSV with --out.
+
+success: goal reached, or the right verdict where the class declares that it can't be; with its 95 % interval (Wilson).
+lost s: robot time beyond the undisturbed run of the same scene and seed. answer s: from a disturbance to the first
+answer without a new plan. unmet: runs that ended before anything befell them.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from bt_tamp.sweep_results import Line, Run
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Store and folder."""
+    parser.add_argument("store", type=Path, metavar="FILE", help="a store that `bt-tamp sweep` wrote")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for plots (PNG) and CSV files")
+
+
+def call(arguments: argparse.Namespace) -> int:
+    """Print the table and what failed; write files if asked to."""
+    from bt_tamp.errors import UserError, refusing
+    from bt_tamp.sweep_results import lines, runs_of
+    from bt_tamp.sweep_store import SweepStore
+
+    if not arguments.store.is_file():
+        raise UserError(f"{arguments.store}: no such file, expected a store that `bt-tamp sweep` wrote")
+    with SweepStore(arguments.store) as store, refusing(ValueError, about=str(arguments.store)):
+        runs = runs_of(store.everything())
+    if not runs:
+        raise UserError(f"{arguments.store}: holds no runs")
+    found = lines(runs)
+    _print(found, runs)
+    if arguments.out is not None:
+        _export(arguments.out, found, runs)
+    return 0
+
+
+def _print(found: "list[Line]", runs: "list[Run]") -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from bt_tamp.sweep_results import scene_name
+
+    console = Console()
+    table = Table(pad_edge=False)
+    table.add_column("scene")
+    table.add_column("class", no_wrap=True)
+    for heading in ("success", "95 %", "replans", "lost s", "answer s", "peak N", "unmet"):
+        table.add_column(heading, justify="right")
+    for line in found:
+        low, high = line.interval
+        table.add_row(
+            scene_name(line.scene),
+            line.disturb + ("" if line.replan else ", open loop"),
+            f"{line.succeeded}/{line.runs}",
+            f"{100 * low:.0f}–{100 * high:.0f}",
+            *(_shown(value) for value in (line.replans, line.lost_s, line.answered_s, line.peak_n)),
+            str(line.unmet) if line.unmet else "",
+        )
+    console.print(table)
+    for run in (run for run in runs if not run.succeeded):
+        said = f"{run.outcome.replace('_', ' ')}{': ' if run.reason else ''}{run.reason}"
+        console.print(Text(f"{run.command}\n    {said}"), soft_wrap=True)
+
+
+def _shown(value: float | None) -> str:
+    return "–" if value is None else f"{value:.1f}"
+
+
+def _export(folder: Path, found: "list[Line]", runs: "list[Run]") -> None:
+    from bt_tamp.errors import refusing
+    from bt_tamp.sweep_export import plot, write_csv
+
+    with refusing(OSError, about=str(folder)):
+        folder.mkdir(parents=True, exist_ok=True)
+        made = write_csv(folder, runs, found)
+        try:
+            made += plot(folder, found)
+        except ImportError:
+            print("bt-tamp: no plots: they need matplotlib (pip install bt-tamp[plots])", file=sys.stderr)
+    for path in made:
+        print(path)

@@ -1,0 +1,138 @@
+"""The classes of disturbances by name: what each does, whether the goal can still be reached, when it may come."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+from pinocchio import SE3
+
+from bt_tamp.disturb import robot, world
+from bt_tamp.disturb.deed import Draw
+from bt_tamp.disturb.faulty import ExhaustedMotionPlanner, FailingSolver, FailingTaskPlanner
+from bt_tamp.disturb.names import CLASSES
+from bt_tamp.executive.seams import Seams
+from planner.refinement import Phase
+from scenarios.goal import goal_text, parse_goal
+from scenarios.scenario import Body, Scenario
+from scenarios.shapes import Box
+
+Fits = Callable[[Phase], bool]
+"""May it come during such a phase?"""
+
+Amend = Callable[[Scenario], Scenario]
+"""The scene with what will come late."""
+
+STRAY, CRUMB, POST = "stray_box", "stray_crumb", "stray_post"
+
+
+def _always(phase: Phase) -> bool:
+    return True
+
+
+def _holding(phase: Phase) -> bool:
+    return phase.held is not None and phase.kind not in ("open",)
+
+
+def _moving(phase: Phase) -> bool:
+    return phase.kind in ("move", "approach", "slide")
+
+
+def _before_grasp(phase: Phase) -> bool:
+    return phase.kind == "approach" and phase.held is None and phase.name == "approach"
+
+
+def _stroking(phase: Phase) -> bool:
+    return phase.kind == "slide"
+
+
+def _unchanged(scenario: Scenario) -> Scenario:
+    return scenario
+
+
+def _real(rng: np.random.Generator) -> Seams:
+    return Seams()
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A class. draw: one instance (None: it is software that fails, by `seams`); fits: the phases in which it may come;
+    while_planning: may it also fall into planning? amend: brings what is needed into the scene."""
+
+    draw: Draw | None = None
+    fits: Fits = _always
+    while_planning: bool = True
+    amend: Amend = _unchanged
+    seams: Callable[[np.random.Generator], Seams] = field(default=_real)
+
+
+def with_late(body: Body, to: str | None, scenario: Scenario) -> Scenario:
+    """The scene with one more body that comes late, wanted in the first region of kind `to` (None: nowhere)."""
+    goal = scenario.goal
+    if to is not None:
+        places = [region.name for region in scenario.regions.values() if region.kind == to]
+        if not places:
+            return scenario
+        goal = goal_text((*parse_goal(goal), ("in_bin", (body.name, places[0]))))
+    bodies = {**scenario.bodies, body.name: body}
+    return replace(scenario, bodies=bodies, goal=goal, late=scenario.late | {body.name})
+
+
+def _box(name: str, size: tuple[float, float, float], mass: float) -> Body:
+    return Body(name, Box(size), mass, 0.5, (0.55, 0.3, 0.6, 1.0), SE3(np.eye(3), np.array([0.0, 0.0, -1.0])))
+
+
+_STRAY = _box(STRAY, (0.05, 0.05, 0.07), 0.15)
+_CRUMB = _box(CRUMB, (0.024, 0.024, 0.024), 0.012)
+_POST = _box(POST, (0.05, 0.05, 0.22), 0.3)
+
+
+def _failing_solver(status: str, rng: np.random.Generator) -> Seams:
+    """40 ms without a solution, time and again."""
+    spells = tuple((int(first), 20) for first in rng.integers(200, 25_000, size=12))
+    return Seams(solver=FailingSolver(status, spells))
+
+
+KINDS: dict[str, Kind] = {
+    "moved": Kind(world.moved),
+    "rotated": Kind(world.rotated),
+    "toppled": Kind(world.toppled),
+    "taken-and-returned": Kind(world.taken_and_returned),
+    "new-object": Kind(partial(world.new_one, name=STRAY), amend=partial(with_late, _STRAY, "bin")),
+    "new-crumb": Kind(partial(world.new_one, name=CRUMB), amend=partial(with_late, _CRUMB, "dustpan")),
+    "path-blocked": Kind(partial(world.path_blocked, name=POST), _moving, False, partial(with_late, _POST, None)),
+    "stroke-blocked": Kind(partial(world.path_blocked, name=POST), _stroking, False, partial(with_late, _POST, None)),
+    "knocked-from-hand": Kind(world.knocked_from_hand, _holding, False),
+    "slipping": Kind(world.slipping, _holding, False),
+    "sponge-far": Kind(world.sponge_far),
+    "sponge-covered": Kind(partial(world.sponge_covered, cover=STRAY), amend=partial(with_late, _STRAY, None)),
+    "bin-shifted": Kind(world.bin_shifted),
+    "crumbs-beside-pan": Kind(world.crumbs_beside_pan),
+    "goal-changed": Kind(world.goal_changed),
+    "push": Kind(robot.push),
+    "closes-on-nothing": Kind(world.closes_on_nothing, _before_grasp, False),
+    "weak-grip": Kind(robot.weak_grip, _holding, False),
+    "force-bias": Kind(robot.force_bias),
+    "force-noise": Kind(robot.force_noise),
+    "force-missing": Kind(robot.force_missing),
+    "force-frozen": Kind(robot.force_frozen),
+    "joint-delay": Kind(robot.joint_delay),
+    "joint-friction": Kind(robot.joint_friction),
+    "pose-noise": Kind(robot.pose_noise),
+    "pose-delay": Kind(robot.pose_delay),
+    "pose-missing": Kind(robot.pose_missing),
+    "qp-infeasible": Kind(seams=partial(_failing_solver, "primal infeasible")),
+    "qp-iterations": Kind(seams=partial(_failing_solver, "maximum iterations reached")),
+    "motion-budget": Kind(seams=lambda rng: Seams(motion=ExhaustedMotionPlanner)),
+    "task-planner": Kind(seams=lambda rng: Seams(task_planner=FailingTaskPlanner)),
+    "taken-for-good": Kind(world.taken_for_good),
+    "sponge-out-of-reach": Kind(world.sponge_out_of_reach),
+}
+assert KINDS.keys() == CLASSES.keys()
+
+
+def amended(scenario: Scenario, classes: Iterable[str]) -> Scenario:
+    """The scene with everything that the classes bring into it."""
+    for name in classes:
+        scenario = KINDS[name].amend(scenario)
+    return scenario

@@ -1,0 +1,148 @@
+"""What is done to a run at one moment, and what whoever does it sees before."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pinocchio import SE3
+
+from bt_tamp.executive.build import Machine
+from planner.motion.motion_planner import MotionPlanner
+from planner.refinement import Phase
+from planner.task.symbols import Fact, GroundAction
+from scenarios.checks import immovable
+from scenarios.scenario import Body, Scenario
+from scenarios.shapes import bounding_radius
+from scenarios.solids import body_solid
+from scenarios.standing import overlap_problem
+from sim.disturbance import Fault
+from sim.plant import Observation
+from sim.scene import SceneState, depth_below
+
+CLEARANCE = 0.01
+"""Metres from the arm, at least, at which something is put down."""
+
+EDGE = 0.02
+"""Metres by which what is put on the table stays away from its edge."""
+
+WORKSPACE = (0.42, 0.78)
+"""Metres from the robot's axis between which what is put down can be taken up again."""
+
+DRAWS = 60
+
+
+@dataclass(frozen=True)
+class Later:
+    """What follows a deed at time `t` (s)."""
+
+    t: float
+    draw: "Draw"
+
+
+@dataclass(frozen=True)
+class Deed:
+    """What is done: a sentence in the past tense for the story, faults for the plant, what is wanted from now on (None:
+    as before), and what follows. names: the bodies concerned."""
+
+    sentence: str
+    faults: tuple[Fault, ...] = ()
+    goal: frozenset[Fact] | None = None
+    later: Later | None = None
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Occasion:
+    """The moment: time t (s), the true state of the world, the machine that runs, and a stream of chance.
+
+    `motion` answers the disturber's own questions about collisions; nothing is counted for the run's planner.
+    """
+
+    t: float
+    truth: Observation
+    machine: Machine
+    motion: MotionPlanner
+    rng: np.random.Generator
+
+    @property
+    def scenario(self) -> Scenario:
+        return self.machine.context.scene.scenario
+
+    @property
+    def scene(self) -> SceneState:
+        """The true scene, the hand as it is believed."""
+        believed = self.machine.context.scene
+        poses = dict(self.truth.poses)
+        held = believed.held if believed.held is not None and believed.held.name in poses else None
+        return SceneState(believed.scenario, poses, self.truth.q, self.truth.opening, held)
+
+    @property
+    def held(self) -> str | None:
+        """What is in the hand."""
+        held = self.scene.held
+        return held.name if held else None
+
+    @property
+    def phase(self) -> Phase | None:
+        """What the arm does now, None while it plans."""
+        return self.machine.context.phase if self.machine.agenda.running is not None else None
+
+    @property
+    def left(self) -> tuple[GroundAction, ...]:
+        """The actions that are left, the running one first."""
+        return self.machine.agenda.left
+
+    def lying(self) -> list[str]:
+        """Bodies of actions that are left, and of what the goal lacks, that lie about; in that order."""
+        agenda = self.machine.agenda
+        facts = agenda.facts(self.machine.context.scene)
+        wanted = [fact.args[0] for fact in sorted(agenda.goal - facts) if fact.args]
+        names = dict.fromkeys([*(action.args[0] for action in self.left), *wanted])
+        return [name for name in names if name in self.truth.poses and name != self.held]
+
+    def table_height(self) -> float:
+        """Height of the table's top in W."""
+        table = self.scenario.table
+        return float(table.X_WT.translation[2]) + table.size[2] / 2
+
+    def stands_free(self, body: Body, X_WO: SE3) -> bool:
+        """Can a body be put at X_WO without overlapping anything, the arm and what it holds included?"""
+        others = [
+            body_solid(self.scenario.bodies[name], X) for name, X in self.truth.poses.items() if name != body.name
+        ]
+        if overlap_problem(body_solid(body, X_WO), [*immovable(self.scenario), *others]) is not None:
+            return False
+        scene = self.scene
+        if scene.held is not None and scene.held.name == body.name:
+            scene = replace(scene, held=None)
+        alone = replace(scene.moved(body.name, X_WO), poses={body.name: X_WO, **_held_pose(scene)})
+        return self.motion.free(alone, self.truth.q, margin=CLEARANCE)
+
+    def spot(self, body: Body, rotation: np.ndarray, around: np.ndarray, distances: tuple[float, float]) -> SE3 | None:
+        """A free place on the table for a body turned so: its distance (m) in the plane from `around` (2,) within
+        `distances`; None if none was found."""
+        table, base = self.scenario.table, self.scenario.robot.X_WB.translation[:2]
+        half = np.array(table.size[:2]) / 2 - EDGE - min(bounding_radius(body.shape), 0.06)
+        z = self.table_height() + depth_below(body.shape, rotation) + 5e-4
+        for _ in range(DRAWS):
+            angle, distance = self.rng.uniform(0.0, 2.0 * np.pi), self.rng.uniform(*distances)
+            p = around + distance * np.array([np.cos(angle), np.sin(angle)])
+            X_WO = SE3(rotation, np.array([*p, z]))
+            on_table = np.abs(table.X_WT.actInv(X_WO.translation)[:2]) < half
+            reach = float(np.linalg.norm(p - base))
+            if on_table.all() and WORKSPACE[0] < reach < WORKSPACE[1] and self.stands_free(body, X_WO):
+                return X_WO
+        return None
+
+
+Draw = Callable[[Occasion], Deed | None]
+"""Draws one instance for an occasion; None if there is nothing to do then."""
+
+
+def _held_pose(scene: SceneState) -> dict[str, SE3]:
+    return {} if scene.held is None else {scene.held.name: scene.poses[scene.held.name]}
+
+
+def in_words(name: str) -> str:
+    """A body's or region's name as it stands in a sentence."""
+    return name.replace("_", " ")

@@ -1,0 +1,174 @@
+"""Does to a run what was declared or drawn: at a time, in a phase, while it plans. It sees everything, and only its own
+plant sees it."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from zlib import crc32
+
+import numpy as np
+
+from bt_tamp.disturb.classes import KINDS, Kind
+from bt_tamp.disturb.deed import Deed, Draw, Occasion
+from bt_tamp.disturb.names import CLASSES
+from bt_tamp.disturb.scheduled import drawing
+from bt_tamp.executive.build import Machine
+from bt_tamp.executive.seams import REAL, Seams
+from planner.motion.motion_planner import MotionPlanner
+from scenarios.disturbance import Disturbance, Moment
+from sim.bullet import BulletPlant
+from sim.disturbance import DisturbedPlant
+
+WHILE_PLANNING = 0.1
+"""Share of the instances that fall into the first planning."""
+
+AGAIN = 0.1
+"""Seconds after which an instance for which there was nothing to do is tried again."""
+
+PATIENCE = 600
+"""How often at most."""
+
+STILL_PHASE = 0.3
+"""Seconds taken for the length of a phase in which only the fingers move."""
+
+
+@dataclass
+class _Coming:
+    """One instance: what draws it, by which chance, and when: `due` (s), once that is known."""
+
+    name: str
+    draw: Draw
+    rng: np.random.Generator
+    moment: Moment | None = None
+    kind: Kind | None = None
+    due: float | None = None
+    share: float = 0.0
+    spot: tuple[str, str] | None = None
+    met: int = 0
+    tries: int = 0
+
+
+@dataclass
+class Driver:
+    """Brings disturbances over one run: those of the scene, and one of each class named.
+
+    `hear` must be told of every event of the run, `bind` of the machine once it is wired.
+    """
+
+    declared: Iterable[Disturbance]
+    classes: Iterable[str]
+    seed: int
+    report: Callable[..., None]
+    _coming: list[_Coming] = field(default_factory=list, init=False)
+    _machine: Machine | None = field(default=None, init=False)
+    _plant: DisturbedPlant | None = field(default=None, init=False)
+    _motion: MotionPlanner | None = field(default=None, init=False)
+    _is_planned: bool = field(default=False, init=False)
+
+    def __post_init__(self) -> None:
+        for number, one in enumerate(self.declared):
+            rng = np.random.default_rng([self.seed, 11, number])
+            self._coming.append(_Coming("declared", drawing(one.happening), rng, moment=one.moment, due=one.moment.at))
+        for name in self.classes:
+            kind, rng = KINDS[name], self._stream(name)
+            if kind.draw is None:
+                continue
+            coming = _Coming(name, kind.draw, rng, kind=kind, share=float(rng.uniform()))
+            if kind.while_planning and rng.uniform() < WHILE_PLANNING:
+                coming.due = float(rng.uniform(0.05, 0.3))
+            self._coming.append(coming)
+
+    @property
+    def seams(self) -> Seams:
+        """What this run is wired with."""
+        found = Seams(plant=self._wrapped)
+        for name in self.classes:
+            given = vars(KINDS[name].seams(self._stream(name)))
+            found = replace(found, **{key: part for key, part in given.items() if part is not getattr(REAL, key)})
+        return found
+
+    def bind(self, machine: Machine) -> None:
+        """The machine is wired."""
+        self._machine = machine
+        self._motion = MotionPlanner(machine.robot, self.seed)
+
+    def hear(self, kind: str, t: float, phase: str = "", action: str = "") -> None:
+        """Something happened in the run."""
+        if kind == "run_started":
+            for name in (name for name in self.classes if KINDS[name].draw is None):
+                self.report("disturbed", name=name, sentence=CLASSES[name].sentence, bodies=[], phase="planning")
+        if kind == "action_started" and not self._is_planned:
+            self._is_planned = True
+            self._choose_phases()
+        if kind == "phase":
+            for coming in self._coming:
+                self._meet(coming, t, action, phase)
+
+    def _stream(self, name: str) -> np.random.Generator:
+        return np.random.default_rng([self.seed, 13, crc32(name.encode())])
+
+    def _wrapped(self, plant: BulletPlant) -> DisturbedPlant:
+        self._plant = DisturbedPlant(plant)
+        self._plant.before_step = self._look_at_the_clock
+        return self._plant
+
+    def _choose_phases(self) -> None:
+        """Every class goes through the kinds of phases in the plan from seed to seed; of a kind it takes any."""
+        assert self._machine is not None
+        for coming in self._coming:
+            if coming.kind is None or coming.due is not None or coming.spot is not None:
+                continue
+            kinds: dict[tuple[str, str], list[tuple[str, str]]] = {}
+            for refinement in self._machine.agenda.refinements:
+                for phase in refinement.phases:
+                    if coming.kind.fits(phase):
+                        spots = kinds.setdefault((refinement.action.name, phase.name), [])
+                        spots.append((str(refinement.action), phase.name))
+            if kinds:
+                spots = kinds[sorted(kinds)[(self.seed + crc32(coming.name.encode())) % len(kinds)]]
+                coming.spot = spots[int(coming.rng.integers(len(spots)))]
+
+    def _meet(self, coming: _Coming, t: float, action: str, phase: str) -> None:
+        if coming.due is not None:
+            return
+        moment = coming.moment
+        if moment is not None:
+            if phase == moment.phase and moment.action in (None, action.partition("(")[0]):
+                coming.met += 1
+                if coming.met == moment.nth:
+                    coming.due = t + moment.after
+        elif coming.spot == (action, phase):
+            coming.due = t + coming.share * self._length_of_phase()
+
+    def _length_of_phase(self) -> float:
+        assert self._machine is not None
+        phase = self._machine.context.phase
+        return max(phase.trajectory.duration, STILL_PHASE) if phase is not None else STILL_PHASE
+
+    def _look_at_the_clock(self, t: float) -> None:
+        for coming in [one for one in self._coming if one.due is not None and one.due <= t]:
+            self._do(coming, t)
+
+    def _do(self, coming: _Coming, t: float) -> None:
+        machine, plant = self._machine, self._plant
+        assert machine is not None
+        assert plant is not None
+        assert self._motion is not None
+        deed = coming.draw(Occasion(t, plant.truth(), machine, self._motion, coming.rng))
+        if deed is None:
+            coming.tries += 1
+            coming.due = t + AGAIN
+            if coming.tries > PATIENCE:
+                self._coming.remove(coming)
+            return
+        self._coming.remove(coming)
+        self._carry_out(coming, deed, machine, plant)
+
+    def _carry_out(self, coming: _Coming, deed: Deed, machine: Machine, plant: DisturbedPlant) -> None:
+        phase = machine.context.phase.name if machine.context.phase and machine.agenda.running else "planning"
+        self.report("disturbed", name=coming.name, sentence=deed.sentence, bodies=list(deed.names), phase=phase)
+        for fault in deed.faults:
+            plant.suffer(fault)
+        if deed.goal is not None:
+            machine.agenda.want(deed.goal)
+        if deed.later is not None:
+            self._coming.append(_Coming(coming.name, deed.later.draw, coming.rng, due=deed.later.t))

@@ -1,0 +1,305 @@
+"""What is done to the world: each function draws one instance of its class for an occasion."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+import pinocchio as pin
+from pinocchio import SE3
+
+from bt_tamp.disturb.deed import Deed, Later, Occasion
+from planner.task.symbols import Fact
+from scenarios.goal import is_crumb
+from scenarios.shapes import extents
+from sim.scene import depth_below, height_above
+from sim.world_faults import BinShifted, Brought, Moved, Slippery, TakenAway
+
+T = TypeVar("T")
+
+NEAR = (0.04, 0.15)
+"""Metres by which something is moved."""
+
+AWAY = (2.0, 5.0)
+"""Seconds for which something is gone."""
+
+
+def moved(now: Occasion) -> Deed | None:
+    """An object of this or a later action is put elsewhere on the table."""
+    for name in _shuffled(now, _on_table(now)):
+        X_WO = now.truth.poses[name]
+        spot = now.spot(now.scenario.bodies[name], X_WO.rotation, X_WO.translation[:2], NEAR)
+        if spot is not None:
+            return _put(now, name, spot, f"{name} was moved by {100 * _between(X_WO, spot):.0f} cm")
+    return None
+
+
+def rotated(now: Occasion) -> Deed | None:
+    """An object is turned on the spot."""
+    for name in _shuffled(now, [name for name in _on_table(now) if not _is_crumb(now, name)]):
+        X_WO = now.truth.poses[name]
+        for _ in range(10):
+            angle = now.rng.uniform(np.radians(30.0), np.radians(90.0)) * now.rng.choice([-1.0, 1.0])
+            turned = SE3(_about_z(angle) @ X_WO.rotation, X_WO.translation + np.array([0.0, 0.0, 5e-4]))
+            if now.stands_free(now.scenario.bodies[name], turned):
+                return _put(now, name, turned, f"{name} was turned by {np.degrees(angle):.0f}°")
+    return None
+
+
+def toppled(now: Occasion) -> Deed | None:
+    """An object that stands is laid on its side."""
+    standing = [name for name in _on_table(now) if _stands(now, name)]
+    for name in _shuffled(now, standing):
+        X_WO = now.truth.poses[name]
+        for _ in range(10):
+            axis = _about_z(now.rng.uniform(0.0, 2.0 * np.pi)) @ np.array([1.0, 0.0, 0.0])
+            rotation = _upright(pin.exp3(np.pi / 2 * axis) @ X_WO.rotation)
+            spot = now.spot(now.scenario.bodies[name], rotation, X_WO.translation[:2], (0.0, 0.08))
+            if spot is not None:
+                return _put(now, name, spot, f"{name} was toppled")
+    return None
+
+
+def taken_and_returned(now: Occasion) -> Deed | None:
+    """An object is taken away and brought back elsewhere some seconds later."""
+    names = _shuffled(now, _on_table(now))
+    if not names:
+        return None
+    name = names[0]
+    back = partial(brought_back, name=name, X_WO=now.truth.poses[name])
+    later = Later(now.t + now.rng.uniform(*AWAY), back)
+    return Deed(f"{name} was taken away", (TakenAway(start=now.t, name=name),), later=later, names=(name,))
+
+
+def brought_back(now: Occasion, name: str, X_WO: SE3) -> Deed | None:
+    """What was taken comes back, near X_WO."""
+    spot = now.spot(now.scenario.bodies[name], X_WO.rotation, X_WO.translation[:2], (0.0, 0.10))
+    if spot is None:
+        return None
+    return Deed(f"{name} was brought back", (Brought(start=now.t, name=name, X_WO=spot),), names=(name,))
+
+
+def taken_for_good(now: Occasion) -> Deed | None:
+    """An object that the goal is about is taken away and does not come back."""
+    for name in _shuffled(now, _lacking(now)):
+        return Deed(f"{name} was taken away for good", (TakenAway(start=now.t, name=name),), names=(name,))
+    return None
+
+
+def new_one(now: Occasion, name: str) -> Deed | None:
+    """The late body `name` appears on the table: the goal is about it as well."""
+    centre = now.scenario.table.X_WT.translation[:2]
+    spot = now.spot(now.scenario.bodies[name], np.eye(3), centre, (0.0, 0.35))
+    if spot is None or name in now.truth.poses:
+        return None
+    return Deed(f"{name} appeared on the table", (Brought(start=now.t, name=name, X_WO=spot),), names=(name,))
+
+
+def path_blocked(now: Occasion, name: str) -> Deed | None:
+    """The late body `name` is put where the running motion is going to come."""
+    phase, controller = now.phase, now.machine.context.controller
+    if phase is None or phase.kind not in ("move", "approach", "slide"):
+        return None
+    body, passed = now.scenario.bodies[name], controller.time_in_reference
+    z = now.table_height() + depth_below(body.shape, np.eye(3)) + 5e-4
+    robot = now.machine.robot
+    for ahead in now.rng.permutation(np.linspace(0.4, 2.0, 9)):
+        t = passed + float(ahead)
+        if t > phase.trajectory.duration:
+            continue
+        p = robot.X_WG(phase.trajectory.at(t)[0]).translation
+        X_WO = SE3(np.eye(3), np.array([p[0], p[1], z]))
+        on_table = (
+            np.abs(now.scenario.table.X_WT.actInv(X_WO.translation)[:2]) < np.array(now.scenario.table.size[:2]) / 2
+        )
+        if not on_table.all() or not now.stands_free(body, X_WO):
+            continue
+        scene = now.scene.moved(name, X_WO)
+        hit = now.motion.audit(scene, phase.trajectory, phase.allowed, since=passed, only=frozenset({name}))
+        if hit is not None:
+            return Deed(f"{name} was put in the way", (Brought(start=now.t, name=name, X_WO=X_WO),), names=(name,))
+    return None
+
+
+def knocked_from_hand(now: Occasion) -> Deed | None:
+    """What is held is knocked from the hand, onto the table."""
+    name = now.held
+    if name is None:
+        return None
+    X_WO = now.truth.poses[name]
+    for around, far in ((X_WO.translation[:2], 0.25), (now.scenario.table.X_WT.translation[:2], 0.35)):
+        rotation = now.scenario.bodies[name].X_WO.rotation
+        spot = now.spot(now.scenario.bodies[name], rotation, around, (0.05, far))
+        if spot is not None:
+            return _put(now, name, spot, f"{name} was knocked from the hand")
+    return None
+
+
+def slipping(now: Occasion) -> Deed | None:
+    """What is held turns slippery for a while."""
+    name = now.held
+    if name is None:
+        return None
+    fault = Slippery(start=now.t, end=now.t + 1.0, name=name, friction=0.002)
+    return Deed(f"{name} turned slippery in the hand for 1 s", (fault,), names=(name,))
+
+
+def closes_on_nothing(now: Occasion) -> Deed | None:
+    """What the fingers are about to close on is pulled away from between them."""
+    action = now.left[0] if now.left else None
+    if action is None or action.args[0] not in now.truth.poses:
+        return None
+    name = action.args[0]
+    X_WO = now.truth.poses[name]
+    spot = now.spot(now.scenario.bodies[name], X_WO.rotation, X_WO.translation[:2], (0.08, 0.30))
+    return None if spot is None else _put(now, name, spot, f"{name} was pulled from between the open fingers")
+
+
+def sponge_far(now: Occasion) -> Deed | None:
+    """The sponge is put at another end of the table."""
+    for name in _sponges(now):
+        X_WO = now.truth.poses[name]
+        rotation = _about_z(now.rng.uniform(0.0, np.pi)) @ now.scenario.bodies[name].X_WO.rotation
+        spot = now.spot(now.scenario.bodies[name], rotation, X_WO.translation[:2], (0.25, 0.60))
+        if spot is not None:
+            return _put(now, name, spot, f"{name} was put {100 * _between(X_WO, spot):.0f} cm away")
+    return None
+
+
+def sponge_covered(now: Occasion, cover: str) -> Deed | None:
+    """The late body `cover` is put on the sponge."""
+    for name in [name for name in _sponges(now) if name != now.held]:
+        top = now.truth.poses[name]
+        body = now.scenario.bodies[cover]
+        z = height_above(now.scenario.bodies[name].shape, top.rotation) + depth_below(body.shape, np.eye(3)) + 1e-3
+        X_WO = SE3(np.eye(3), top.translation + np.array([0.0, 0.0, z]))
+        if cover not in now.truth.poses and now.stands_free(body, X_WO):
+            sentence = f"{cover} was put on {name}"
+            return Deed(sentence, (Brought(start=now.t, name=cover, X_WO=X_WO),), names=(cover, name))
+    return None
+
+
+def sponge_out_of_reach(now: Occasion) -> Deed | None:
+    """The sponge is thrown on the floor, far from the robot."""
+    for name in [name for name in _sponges(now) if name in _lacking(now)]:
+        base = now.scenario.robot.X_WB.translation
+        spot = SE3(np.eye(3), np.array([base[0] + 1.8, base[1] + 1.8, 0.1]))
+        return _put(now, name, spot, f"{name} was thrown on the floor, out of reach")
+    return None
+
+
+def bin_shifted(now: Occasion) -> Deed | None:
+    """A bin that is still needed is shifted by some centimetres."""
+    wanted = {arg for action in now.left for arg in action.args[1:]}
+    bins = [n for n, region in now.scenario.regions.items() if region.kind == "bin" and n in wanted]
+    for name in _shuffled(now, bins):
+        region, base = now.scenario.regions[name], now.scenario.robot.X_WB.translation
+        outward = region.X_WR.translation[:2] - base[:2]
+        outward = outward / np.linalg.norm(outward)
+        sideways = np.array([-outward[1], outward[0]]) * now.rng.choice([-1.0, 1.0])
+        x, y = 0.03 * outward * now.rng.uniform(0.0, 1.0) + sideways * now.rng.uniform(0.03, 0.06)
+        fault = BinShifted(start=now.t, region=name, by=(float(x), float(y), 0.0))
+        return Deed(f"{name} was shifted by {100 * np.hypot(x, y):.0f} cm", (fault,), names=(name,))
+    return None
+
+
+def crumbs_beside_pan(now: Occasion) -> Deed | None:
+    """A crumb comes to lie on the table's edge, beside the dustpan's opening."""
+    pans = [region for region in now.scenario.regions.values() if region.kind == "dustpan"]
+    crumbs = [name for name in now.truth.poses if _is_crumb(now, name) and name != now.held]
+    for pan in pans:
+        for name in _shuffled(now, [name for name in crumbs if name in _goal_bodies(now)]):
+            body = now.scenario.bodies[name]
+            beside = pan.X_WR.translation[:2] + (pan.size[0] / 2 + 0.03) * now.rng.choice([-1.0, 1.0]) * np.array(
+                [1.0, 0]
+            )
+            spot = now.spot(body, np.eye(3), beside, (0.05, 0.20))
+            if spot is not None:
+                return _put(now, name, spot, f"{name} came to lie on the table beside {pan.name}")
+    return None
+
+
+def goal_changed(now: Occasion) -> Deed | None:
+    """Something is wanted in another bin than before."""
+    agenda = now.machine.agenda
+    facts = agenda.facts(now.machine.context.scene)
+    bins = sorted(name for name, region in now.scenario.regions.items() if region.kind == "bin")
+    changeable = [f for f in sorted(agenda.goal - facts) if f.predicate == "in_bin" and f.args[1] in bins]
+    for fact in _shuffled(now, changeable):
+        others = [name for name in bins if name != fact.args[1]]
+        if others:
+            other = others[int(now.rng.integers(len(others)))]
+            wanted = agenda.goal - {fact} | {Fact("in_bin", (fact.args[0], other))}
+            return Deed(
+                f"{fact.args[0]} is wanted in {other} instead of {fact.args[1]}", goal=wanted, names=(fact.args[0],)
+            )
+    return None
+
+
+def _put(now: Occasion, name: str, X_WO: SE3, sentence: str) -> Deed:
+    return Deed(sentence, (Moved(start=now.t, name=name, X_WO=X_WO),), names=(name,))
+
+
+def _shuffled(now: Occasion, items: Sequence[T]) -> list[T]:
+    return [items[k] for k in now.rng.permutation(len(items))]
+
+
+def _on_table(now: Occasion) -> list[str]:
+    """What lies about, is still needed, and not in a region."""
+    regions = now.scenario.regions.values()
+    return [
+        name
+        for name in now.lying()
+        if not any(
+            (np.abs(region.X_WR.actInv(now.truth.poses[name].translation)) < np.array(region.size) / 2).all()
+            for region in regions
+        )
+    ]
+
+
+def _lacking(now: Occasion) -> list[str]:
+    """Bodies that are there, not in the hand, and that the goal still lacks."""
+    agenda = now.machine.agenda
+    missing = agenda.goal - agenda.facts(now.machine.context.scene)
+    names = sorted({fact.args[0] for fact in missing if fact.args})
+    return [name for name in names if name in now.truth.poses and name != now.held]
+
+
+def _goal_bodies(now: Occasion) -> set[str]:
+    return {fact.args[0] for fact in now.machine.agenda.goal if fact.args}
+
+
+def _sponges(now: Occasion) -> list[str]:
+    """Sponges that are there and still needed."""
+    bodies = now.scenario.bodies
+    needed = {arg for action in now.left for arg in action.args} | set(_lacking(now))
+    wipes = any(_is_crumb(now, name) for name in _lacking(now))
+    return [name for name in now.truth.poses if bodies[name].tool == "sponge" and (wipes or name in needed)]
+
+
+def _is_crumb(now: Occasion, name: str) -> bool:
+    return is_crumb(now.scenario.bodies[name], now.scenario.robot.model)
+
+
+def _stands(now: Occasion, name: str) -> bool:
+    body, R = now.scenario.bodies[name], now.truth.poses[name].rotation
+    height = height_above(body.shape, R) + depth_below(body.shape, R)
+    return not _is_crumb(now, name) and body.tool is None and height > 1.3 * float(min(extents(body.shape)))
+
+
+def _between(X_WA: SE3, X_WB: SE3) -> float:
+    return float(np.linalg.norm((X_WB.translation - X_WA.translation)[:2]))
+
+
+def _about_z(angle: float) -> np.ndarray:
+    return pin.exp3(np.array([0.0, 0.0, float(angle)]))
+
+
+def _upright(rotation: np.ndarray) -> np.ndarray:
+    """The nearest rotation in which one of the body's axes points up."""
+    axis = int(np.argmax(np.abs(rotation[2])))
+    up = rotation[:, axis] * np.sign(rotation[2, axis])
+    z = np.array([0.0, 0.0, 1.0])
+    turn = np.cross(up, z)
+    sine = float(np.linalg.norm(turn))
+    return rotation if sine < 1e-9 else pin.exp3(turn / sine * np.arctan2(sine, float(up @ z))) @ rotation

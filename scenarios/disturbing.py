@@ -1,0 +1,102 @@
+"""The disturbances that a scene file declares, resolved: references checked, poses in W, angles in rad."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from pinocchio import SE3
+
+from scenarios import schema
+from scenarios.checks import Problem
+from scenarios.disturbance import (
+    Bring,
+    Disorder,
+    Disturbance,
+    Happening,
+    Moment,
+    Move,
+    NewGoal,
+    PushArm,
+    ShiftRegion,
+    Take,
+    WeakenGrip,
+)
+from scenarios.goal import GoalError, check_goal, goal_text, parse_goal
+from scenarios.names import TABLE, known
+from scenarios.placing import body_frame, heights_of
+from scenarios.robots import ROBOTS
+from scenarios.scenario import Scenario
+from scenarios.schema_disturbances import HAPPENINGS, Entry
+from scenarios.schema_parts import PoseOn
+
+Triple = tuple[float, float, float]
+
+
+def late_ones(file: schema.SceneFile) -> frozenset[str]:
+    """Objects that are brought before they are taken, in the order of the file: not there at the start."""
+    first: dict[str, bool] = {}
+    for entry in file.disturbances:
+        if entry.bring is not None:
+            first.setdefault(entry.bring.object, True)
+        if entry.take is not None:
+            first.setdefault(entry.take.object, False)
+    return frozenset(name for name, is_brought in first.items() if is_brought)
+
+
+def disturbance_problems(file: schema.SceneFile, scenario: Scenario) -> Iterator[Problem]:
+    """Objects, regions, links and goals that the scene doesn't know."""
+    links = ROBOTS[scenario.robot.model].links
+    for number, entry in enumerate(file.disturbances):
+        key = next(key for key in HAPPENINGS if getattr(entry, key) is not None)
+        what, path = getattr(entry, key), ("disturbances", number, key)
+        name = getattr(what, "object", None)
+        if name is not None and name not in scenario.bodies:
+            yield (*path, "object"), f"unknown object {name!r}, {known(name, scenario.bodies)}"
+        if entry.shift is not None and entry.shift.region not in scenario.regions:
+            region = entry.shift.region
+            yield (*path, "region"), f"unknown region {region!r}, {known(region, scenario.regions)}"
+        if entry.push is not None and entry.push.link is not None and entry.push.link not in links:
+            yield (*path, "link"), f"unknown link {entry.push.link!r}, {known(entry.push.link, links)}"
+        pose = entry.bring.pose if entry.bring is not None else None
+        if isinstance(pose, PoseOn) and pose.on not in (surfaces := {TABLE, *scenario.regions}):
+            yield (*path, "pose", "on"), f"unknown surface {pose.on!r}, {known(pose.on, surfaces)}"
+        if entry.goal is not None:
+            try:
+                check_goal(parse_goal(entry.goal), scenario.bodies, scenario.regions)
+            except GoalError as error:
+                yield path, str(error)
+
+
+def disturbances(file: schema.SceneFile, scenario: Scenario) -> tuple[Disturbance, ...]:
+    """The file's disturbances. What they name must be known."""
+    heights = heights_of(scenario)
+    return tuple(Disturbance(_moment(entry), _happening(entry, scenario, heights)) for entry in file.disturbances)
+
+
+def _moment(entry: Entry) -> Moment:
+    return Moment(entry.at, entry.phase or "", entry.action, entry.nth, entry.after)
+
+
+def _happening(entry: Entry, scenario: Scenario, heights: Mapping[str, float]) -> Happening:
+    if entry.move is not None:
+        return Move(entry.move.object, _triple(entry.move.by), _triple(np.radians(entry.move.turn_deg)))
+    if entry.take is not None:
+        return Take(entry.take.object)
+    if entry.bring is not None:
+        body, pose = scenario.bodies[entry.bring.object], entry.bring.pose
+        X_WO: SE3 = body.X_WO if pose is None else body_frame(pose, body.shape, heights)
+        return Bring(body.name, X_WO)
+    if entry.shift is not None:
+        return ShiftRegion(entry.shift.region, _triple(entry.shift.by))
+    if entry.push is not None:
+        return PushArm(_triple(entry.push.force), entry.push.seconds, entry.push.link)
+    if entry.grip is not None:
+        return WeakenGrip(entry.grip.force, entry.grip.seconds)
+    if entry.disorder is not None:
+        return Disorder(entry.disorder.what, entry.disorder.size, entry.disorder.seconds)
+    assert entry.goal is not None
+    return NewGoal(goal_text(parse_goal(entry.goal)))
+
+
+def _triple(values: "list[float] | np.ndarray") -> Triple:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -1,0 +1,53 @@
+"""Going on from where another run ended."""
+
+import json
+
+import pytest
+
+from bt_tamp.cli import main
+from bt_tamp.report.scenario_json import scenario_from_json
+from bt_tamp.report.state import RunState
+
+
+@pytest.fixture(scope="module")
+def cut_short(tmp_path_factory):
+    """A run that ended with the sponge in the hand."""
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    assert main(["run", "fig2", "--max-sim-time", "3.6", "--out", str(folder)]) == 12
+    assert RunState.from_json((folder / "state.json").read_text()).held == "sponge"
+    return folder
+
+
+def test_a_run_goes_on_with_what_was_in_the_hand(cut_short, tmp_path, capsys):
+    before = RunState.from_json((cut_short / "state.json").read_text())
+    again = tmp_path / "again"
+    assert main(["run", "--resume", str(cut_short), "--max-sim-time", "1.0", "--out", str(again)]) == 12
+    result = json.loads((again / "result.json").read_text())
+    assert not any(action.startswith("pick") for action in result["plan"])
+    assert result["plan"][0].startswith("wipe")
+    after = RunState.from_json((again / "state.json").read_text())
+    assert after.held == "sponge"
+    assert after.poses["cube"] == pytest.approx(before.poses["cube"], abs=1e-3)
+
+
+def test_a_state_is_read_as_it_was_written_and_fits_its_scene_only(cut_short):
+    text = (cut_short / "state.json").read_text()
+    state = RunState.from_json(text)
+    assert state.to_json() == text
+    scenario = scenario_from_json((cut_short / "scenario.json").read_text())
+    assert state.applied(scenario).goal == scenario.goal
+    bodies = {name: body for name, body in scenario.bodies.items() if name != "cube"}
+    with pytest.raises(ValueError, match="another scene: it knows no cube"):
+        state.applied(type(scenario)(**(vars(scenario) | {"bodies": bodies})))
+
+
+@pytest.mark.parametrize("arguments", [[], ["fig2", "--resume", "runs/x"]])
+def test_a_run_begins_with_a_scene_or_where_another_ended(arguments, capsys):
+    assert main(["run", *arguments]) == 2
+    assert capsys.readouterr().err == "bt-tamp: name a scene, or a run's folder with --resume; one of them\n"
+
+
+def test_a_folder_without_a_state_is_refused(tmp_path, capsys):
+    (tmp_path / "events.jsonl").write_text("")
+    assert main(["run", "--resume", str(tmp_path)]) == 2
+    assert "scenario.json" in capsys.readouterr().err

@@ -1,0 +1,136 @@
+"""What is made of the results of sweeps."""
+
+import csv
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bt_tamp.cli import main
+from bt_tamp.commands.choices import options_of
+from bt_tamp.options import RunOptions
+from bt_tamp.report.result import Befallen, RunResult
+from bt_tamp.sweep import MAX_TRIES, Finished, Job, run_jobs
+from bt_tamp.sweep_results import lines, replay_command, runs_of, wilson
+from bt_tamp.sweep_store import SweepStore
+
+MOVED = Befallen(3.0, "moved", "book was moved by 5 cm", "approach", "refined_again", 0.1)
+
+
+def finished(seed, robot_s, disturb=(), outcome="goal_reached", reason="", **options) -> Finished:
+    befell = tuple(Befallen(**(vars(MOVED) | {"name": name})) for name in disturb)
+    result = RunResult("fig2", seed, outcome, reason, {}, robot_s=robot_s, replans=1, disturbances=befell)
+    job = Job("fig2", RunOptions(seed=seed, disturb=disturb, **options))
+    return Finished(job, outcome, reason, result.to_json())
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    path = tmp_path / "s.db"
+    with SweepStore(path) as opened:
+        for seed in range(3):
+            opened.add(finished(seed, 20.0 + seed))
+        opened.add(finished(0, 24.0, ("moved",)))
+        opened.add(finished(1, 27.0, ("moved",)))
+        opened.add(finished(2, 9.0, ("moved",), "gave_up", "25 plans were made"))
+        opened.add(finished(0, 8.0, ("moved",), "gave_up", "open loop: it failed", replan=False))
+        opened.add(finished(0, 30.0, ("taken-for-good",), "no_plan", "cube is nowhere to be seen"))
+        opened.add(finished(1, 30.0, ("taken-for-good",), "goal_reached"))
+    return path
+
+
+def table(store: Path):
+    with SweepStore(store) as opened:
+        return {(line.disturb, line.replan): line for line in lines(runs_of(opened.everything()))}
+
+
+def test_time_is_lost_against_the_undisturbed_run_of_the_same_seed(store):
+    found = table(store)
+    assert found["moved", True].lost_s == 5.0
+    assert found["moved", True].answered_s == pytest.approx(0.1)
+    assert found["moved", True].succeeded == 2
+    assert found["moved", True].reasons == (("gave up: 25 plans were made", 1),)
+    assert found["moved", False].succeeded == 0
+
+
+def test_where_the_goal_cannot_be_reached_the_right_verdict_is_the_success(store):
+    assert table(store)["taken-for-good", True].succeeded == 1
+
+
+@settings(derandomize=True, max_examples=60)
+@given(runs=st.integers(1, 300), share=st.floats(0.0, 1.0))
+def test_the_interval_holds_the_rate_and_narrows_with_more_runs(runs, share):
+    succeeded = round(share * runs)
+    low, high = wilson(succeeded, runs)
+    assert 0.0 <= low <= succeeded / runs <= high <= 1.0
+    more_low, more_high = wilson(4 * succeeded, 4 * runs)
+    assert more_high - more_low < high - low
+
+
+def test_wilson_as_it_stands_in_books():
+    assert wilson(10, 10) == (pytest.approx(0.7225, abs=1e-3), 1.0)
+    assert wilson(0, 0) == (0.0, 1.0)
+
+
+def test_the_command_names_every_choice_and_means_the_same_run():
+    from bt_tamp.cli import parser
+
+    options = RunOptions(seed=4, disturb=("moved", "push"), replan=False, contact="impedance", max_sim_time=120.0)
+    data = {name: value for name, value in vars(options).items() if name != "seed"}
+    command = replay_command("fig1", 4, data | {"disturb": list(options.disturb), "digest": "abc"})
+    arguments = parser().parse_args(command.split()[1:])
+    assert options_of(arguments) == options
+
+
+def test_the_table_is_printed_and_written(store, tmp_path, capsys):
+    assert main(["results", str(store), "--out", str(tmp_path / "out")]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "bt-tamp run fig2 --seed 2 --disturb moved gave up: 25 plans were made" in said
+    assert (tmp_path / "out" / "fig2.png").read_bytes().startswith(b"\x89PNG")
+    with (tmp_path / "out" / "runs.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 9
+    assert {row["succeeded"] for row in rows} == {"True", "False"}
+
+
+def test_a_store_that_is_not_there_is_refused(tmp_path, capsys):
+    assert main(["results", str(tmp_path / "no.db")]) == 2
+    assert "no such file" in capsys.readouterr().err
+    assert not (tmp_path / "no.db").exists()
+
+
+@pytest.mark.parametrize("command", ["run", "sweep"])
+def test_an_unknown_class_is_refused_in_one_line(command, tmp_path, capsys):
+    store = ["--store", str(tmp_path / "s.db")] if command == "sweep" else []
+    assert main([command, "fig2", "--disturb", "mooved", *store]) == 2
+    complaint = capsys.readouterr().err
+    assert complaint.count("\n") == 1
+    assert "did you mean 'moved'?" in complaint
+
+
+def test_a_run_that_kills_its_process_each_time_is_tried_twice_and_recorded_so(tmp_path):
+    def work(given: Job) -> Finished:
+        if given.options.seed == 0:
+            os._exit(9)
+        return Finished(given, "goal_reached", "")
+
+    jobs = [Job("fig2", RunOptions(seed=seed)) for seed in range(2)]
+    with SweepStore(tmp_path / "s.db") as store:
+        for done in run_jobs(jobs, 1, work):
+            store.add(done)
+        rows = store.stored(jobs)
+    assert [(row.outcome, row.tries, row.is_final) for row in rows.values()] == [
+        ("killed", MAX_TRIES, True),
+        ("goal_reached", 1, True),
+    ]
+
+
+def test_a_crash_is_tried_once_more_by_a_resumed_sweep(tmp_path):
+    job = Job("fig2", RunOptions())
+    with SweepStore(tmp_path / "s.db") as store:
+        store.add(Finished(job, "crashed", "broken"))
+        assert not store.stored([job])[job].is_final
+        store.add(Finished(job, "crashed", "broken"))
+        assert store.stored([job])[job].is_final
