@@ -21,6 +21,7 @@ BENCHES = {
     "force": "slides at 0.1 m/s: laws side by side, then every disturbance alone and all together",
     "wipe": "random crumbs, the dustpan on each side of the table in turn: how many lie in it in the end",
     "drag": "random flat boxes: how many are dragged to an edge of their table and picked there",
+    "motion": "the paper's motion planners on fig1's queries and random ones, beside pybullet-planning",
     "control": "cost of a control tick by part beside the bare physics step, and the real-time factor",
 }
 

@@ -84,10 +84,19 @@ class Thinker:
     goal: frozenset[Fact]
 
 
-def build_planner(scenario: Scenario, options: RunOptions, robot: RobotModel, report: Callable[..., None]) -> Thinker:
-    """What plans for `scenario`. Raises PddlError for hand-written PDDL that does not fit, ValueError for options."""
+def build_planner(
+    scenario: Scenario,
+    options: RunOptions,
+    robot: RobotModel,
+    report: Callable[..., None],
+    motion_planner: type[MotionPlanner] = MotionPlanner,
+) -> Thinker:
+    """What plans for `scenario`. Raises PddlError for hand-written PDDL that does not fit, ValueError for options.
+
+    motion_planner: another class in its place, which listens to what is asked.
+    """
     work = Work()
-    motion = MotionPlanner(robot, options.seed, motion_settings(options), work)
+    motion = motion_planner(robot, options.seed, motion_settings(options), work)
     primitives = skills(Toolkit(robot, motion, contact_settings(options)))
     task_planner = PyperplanPlanner(options.search or ("astar-hmax" if options.preset == "paper" else "auto"))
     settings = PlanSettings() if options.tries is None else PlanSettings(tries=options.tries)

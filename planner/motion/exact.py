@@ -219,7 +219,7 @@ def _outward_pairs(
 def _inward_pairs(parts: tuple[str, ...], names: tuple[str, ...], margins: Margins) -> _Pairs:
     """The robot's own solids against each other."""
     pairs, rows, a, b = _inward_numbers(parts, names)
-    margin = np.array([margins.within_robot(*pair) for pair in pairs])[rows]
+    margin = margins.within_robot(pairs)[rows]
     kept = margin > -np.inf
     return _Pairs(a[kept], b[kept], margin[kept])
 
@@ -227,13 +227,13 @@ def _inward_pairs(parts: tuple[str, ...], names: tuple[str, ...], margins: Margi
 @lru_cache(maxsize=64)
 def _inward_numbers(
     parts: tuple[str, ...], names: tuple[str, ...]
-) -> tuple[list[tuple[str, str]], np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[list[Pair], np.ndarray, np.ndarray, np.ndarray]:
     """The pairs of parts, and for each pair of their solids: its pair's row, and the two numbers."""
     pairs = self_collision_pairs(parts)
     solids = {part: [k for k, name in enumerate(names) if name == part] for part in parts}
     found = [(row, a, b) for row, (first, second) in enumerate(pairs) for a in solids[first] for b in solids[second]]
     rows, a, b = (np.array(column) for column in zip(*found, strict=True))
-    return pairs, rows, a, b
+    return [frozenset(pair) for pair in pairs], rows, a, b
 
 
 @lru_cache(maxsize=64)

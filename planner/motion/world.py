@@ -135,9 +135,13 @@ class Margins:
                     margins[rows, columns] = self._of(pair, self.free)
         return margins
 
-    def within_robot(self, first: str, second: str) -> float:
-        """Margin between two of the robot's own parts (or one and the held body); −inf if it is allowed."""
-        return self._of(frozenset((first, second)), 0.0)
+    def within_robot(self, own: Sequence[Pair]) -> np.ndarray:
+        """Margins (n,) between pairs of the robot's own parts (or one and the held body); −inf where allowed."""
+        margins = np.zeros(len(own))
+        if self.allowed or self.relaxed:
+            for k, pair in enumerate(own):
+                margins[k] = self._of(pair, 0.0)
+        return margins
 
     def _of(self, pair: Pair, default: float) -> float:
         if pair in self.allowed:
