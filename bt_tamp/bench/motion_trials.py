@@ -112,7 +112,7 @@ def compiled(arena: Arena, seed: int) -> Trial:
 
 
 def move(arena: Arena, seed: int) -> Move:
-    """As a skill asks for it, in a scene never seen before."""
+    """As a skill asks for it while a plan is refined: one thing has been moved since the query before."""
     query, planner = arena.query, MotionPlanner(arena.robot, seed)
     started = time.thread_time()
     planner.way(_anew(query.scene), [query.goal], query.allowed)
@@ -129,8 +129,9 @@ def move(arena: Arena, seed: int) -> Move:
 
 
 def _anew(scene: SceneState) -> SceneState:
-    """The same scene as another object: nothing is known of it."""
-    return replace(scene, poses={name: X_WO.copy() for name, X_WO in scene.poses.items()})
+    """The same scene, the first thing in it put where it is: what was known of it is not known of this one."""
+    name, X_WO = next(iter(scene.poses.items()), (None, None))
+    return replace(scene) if X_WO is None else scene.moved(name, X_WO.copy())
 
 
 class _Until:

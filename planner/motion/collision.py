@@ -10,6 +10,7 @@ from pinocchio import SE3
 from planner.motion.chain import chain, placement
 from planner.motion.kernels import edge_is_free, hand_contacts
 from planner.motion.tables import (
+    BOUND,
     BOX,
     COUNT,
     CYLINDER,
@@ -17,6 +18,7 @@ from planner.motion.tables import (
     FIRST,
     HALF,
     HULL,
+    KIND,
     LOWER,
     OBSTACLE_COLUMNS,
     PART,
@@ -28,7 +30,7 @@ from planner.motion.tables import (
     SceneArrays,
     pack,
 )
-from planner.motion.world import Margins, Standing
+from planner.motion.world import Margins, Same, Standing
 from planner.refinement import Pair
 from scenarios.shapes import (
     Box,
@@ -161,14 +163,22 @@ _NO_CORNERS = np.zeros((0, 3))
 
 def _solid_row(shape: Convex, X: SE3, part: int) -> np.ndarray:
     """A row of a table of solids (SOLID_COLUMNS,), its corners not counted yet."""
-    row = np.zeros(SOLID_COLUMNS)
-    row[:HALF] = _kind(shape), part, bounding_radius(shape)
-    row[HALF:PLACE] = extents(shape) / 2
+    row = _shape_row(shape).copy()
+    row[PART] = part
+    row[PLACE : PLACE + 9], row[PLACE + 9 : FIRST] = X.rotation.ravel(), X.translation
     if isinstance(shape, Hull):
-        X = X * SE3(np.eye(3), middle(shape))
-        row[HALF - 1] = float(np.linalg.norm(shape.solid.vertices - middle(shape), axis=1).max())
+        row[PLACE + 9 : FIRST] = X.act(middle(shape))
+    return row
+
+
+@lru_cache(maxsize=1024)
+def _shape_row(shape: Convex) -> np.ndarray:
+    """A solid's row but for where it is and to what it belongs."""
+    row = np.zeros(SOLID_COLUMNS)
+    row[KIND], row[BOUND], row[HALF:PLACE] = _kind(shape), bounding_radius(shape), extents(shape) / 2
+    if isinstance(shape, Hull):
+        row[BOUND] = float(np.linalg.norm(shape.solid.vertices - middle(shape), axis=1).max())
         row[COUNT], row[FACES] = len(shape.solid.vertices), len(shape.solid.normals)
-    row[PLACE:FIRST] = placement(X)
     return row
 
 
@@ -222,9 +232,19 @@ def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | No
 @lru_cache(maxsize=64)
 def _obstacle_rows(standing: Standing) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     """Names, the table (n, OBSTACLE_COLUMNS) and that of its corners (h,3), as in `tables`."""
-    world = standing.obstacles
-    table, corners = placed_rows([(obstacle.shape, obstacle.X_WS) for obstacle in world])
-    return tuple(obstacle.name for obstacle in world), table, corners
+    groups = standing.groups
+    parts = [_group_rows(Same(group)) for group in groups]
+    table = np.concatenate([rows for rows, _ in parts])
+    before = np.cumsum([0, *(len(corners) for _, corners in parts[:-1])])
+    table[:, FIRST] += np.repeat(before, [len(rows) for rows, _ in parts])
+    names = tuple(obstacle.name for group in groups for obstacle in group)
+    return names, table, np.concatenate([corners for _, corners in parts])
+
+
+@lru_cache(maxsize=1024)
+def _group_rows(group: Same) -> tuple[np.ndarray, np.ndarray]:
+    (obstacles,) = group.things
+    return placed_rows([(obstacle.shape, obstacle.X_WS) for obstacle in obstacles])
 
 
 def placed_rows(solids: Sequence[tuple[Convex, SE3]]) -> tuple[np.ndarray, np.ndarray]:
