@@ -15,6 +15,9 @@ from planner.motion.ompl_ import Query
 NODES = 4000
 SHORTCUTS = 40
 
+_part = njit(inline="always")
+"""Compiled into `_plan` only: every function of its own would have the kernels compiled into it anew."""
+
 
 @dataclass(frozen=True)
 class CompiledPath:
@@ -40,15 +43,10 @@ def _plan(start, goal, packed, limits, step, rng):
     return found, count, short, _shorten(short, count, packed, rng)
 
 
-@njit(cache=True)
-def _free(a, b, packed):
-    return edge_is_free(a, b, packed, JOINT_STEP, TRAVEL_STEP)[0]
-
-
-@njit(cache=True)
+@_part
 def _search(start, goal, packed, limits, step, rng, found):
     """Write the waypoints to `found`; how many there are."""
-    if _free(start, goal, packed):
+    if edge_is_free(start, goal, packed, JOINT_STEP, TRAVEL_STEP)[0]:
         found[0], found[1] = start, goal
         return 2
     trees, parents = np.empty((2, NODES, 7)), np.zeros((2, NODES), dtype=np.int64)
@@ -71,7 +69,7 @@ def _search(start, goal, packed, limits, step, rng, found):
     return 0
 
 
-@njit(cache=True)
+@_part
 def _extend(tree, parent, sizes, n, target, step, packed, q):
     """Add an edge towards the target: 0 if it is blocked, 1 if there is some way left, 2 if the target is reached."""
     nearest, least = 0, np.inf
@@ -86,14 +84,14 @@ def _extend(tree, parent, sizes, n, target, step, packed, q):
     for k in range(7):
         q[k] = tree[nearest, k] + (target[k] - tree[nearest, k]) * part
     # The goal's tree too is checked outwards: its near end is known to be free.
-    if not _free(tree[nearest], q, packed):
+    if not edge_is_free(tree[nearest], q, packed, JOINT_STEP, TRAVEL_STEP)[0]:
         return 0
     tree[sizes[n]], parent[sizes[n]] = q, nearest
     sizes[n] += 1
     return 2 if part == 1.0 else 1
 
 
-@njit(cache=True)
+@_part
 def _joined(trees, parents, sizes, found):
     """Write the path through the last nodes of both trees, which are the same, to `found`; its waypoints."""
     count, node = 0, sizes[0] - 1
@@ -114,7 +112,7 @@ def _joined(trees, parents, sizes, found):
     return count
 
 
-@njit(cache=True)
+@_part
 def _shorten(path, count, packed, rng):
     """Shorten the path's first `count` waypoints in place, as `planner.motion.shortcut` does; how many are left."""
     count = _without_detours(path, count, packed)
@@ -133,7 +131,7 @@ def _shorten(path, count, packed, rng):
             continue
         qa = path[i] + (path[i + 1] - path[i]) * ((first - way[i]) / (way[i + 1] - way[i]))
         qb = path[j] + (path[j + 1] - path[j]) * ((second - way[j]) / (way[j + 1] - way[j]))
-        if _free(qa, qb, packed):
+        if edge_is_free(qa, qb, packed, JOINT_STEP, TRAVEL_STEP)[0]:
             tail = path[j + 1 : count].copy()
             path[i + 1], path[i + 2] = qa, qb
             path[i + 3 : i + 3 + len(tail)] = tail
@@ -141,12 +139,12 @@ def _shorten(path, count, packed, rng):
     return _without_detours(path, count, packed)
 
 
-@njit(cache=True)
+@_part
 def _without_detours(path, count, packed):
     kept, i = 1, 0
     while i < count - 1:
         j = count - 1
-        while j > i + 1 and not _free(path[i], path[j], packed):
+        while j > i + 1 and not edge_is_free(path[i], path[j], packed, JOINT_STEP, TRAVEL_STEP)[0]:
             j -= 1
         # kept ≤ j: nothing still needed is written over.
         path[kept] = path[j]

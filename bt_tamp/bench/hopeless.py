@@ -8,18 +8,20 @@ from pinocchio import SE3
 from bt_tamp.bench.motion_queries import MotionQuery
 from planner.motion.motion_planner import MotionPlanner
 from scenarios.scenario import Fixture
-from scenarios.shapes import Box
+from scenarios.shapes import Box, bounding_radius
 from sim.robot import RobotModel
 from sim.scene import SceneState
 
 DEPTH, DEEPEST = 0.01, 0.15
 """Metres by which the hand is lowered at a time, and at most, until it collides."""
 
-ROOM = 0.03
-"""Metres between the forearm and the walls around it: the hand, 15 cm wide, does not pass."""
+LINK = "link_5"
+"""The link that the walls stand around."""
 
-LENGTH, THICKNESS = 0.12, 0.03
-WRIST_RADIUS = 0.09
+ROOM = 0.01
+"""Metres between that link and the walls: too little to be drawn out by chance, though it is no proof."""
+
+LENGTH, THICKNESS = 0.06, 0.03
 
 
 @dataclass(frozen=True)
@@ -42,31 +44,37 @@ def lowered(motion: MotionPlanner, query: MotionQuery) -> Hopeless | None:
 
 
 def walled(motion: MotionPlanner, query: MotionQuery) -> Hopeless | None:
-    """The same way with fixed walls around the forearm at the goal; None if start or goal collides with them."""
-    scene = _with_walls(query.scene, _forearm(motion.robot, query.goal))
+    """The same way with fixed walls close about the forearm at the goal; None if start or goal hits them."""
+    scene = _with_walls(query.scene, *_forearm(motion.robot, query.goal))
     if all(motion.free(replace(scene, q=q), q) for q in (scene.q, query.goal)):
         return Hopeless("walled in", replace(query, scene=scene))
     return None
 
 
-def _forearm(robot: RobotModel, q: np.ndarray) -> SE3:
-    """A frame half way from elbow to wrist, z along the forearm, in W."""
+def _forearm(robot: RobotModel, q: np.ndarray) -> tuple[SE3, np.ndarray]:
+    """A frame in W amid the link's solids, z from elbow to wrist, and half of their extents along its x and y."""
     poses = robot.link_poses(q, 0.0)
-    elbow, wrist = poses["link_4"].translation, poses["link_6"].translation
-    z = (wrist - elbow) / np.linalg.norm(wrist - elbow)
+    z = poses["link_6"].translation - poses["link_4"].translation
+    z /= np.linalg.norm(z)
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)
-    return SE3(np.column_stack([x, np.cross(z, x), z]), (elbow + wrist) / 2)
+    R_WF = np.column_stack([x, np.cross(z, x), z])
+    solids = [solid for solid in robot.geometry if solid.link == LINK]
+    centres = np.array([(poses[LINK] * solid.X_LS).translation for solid in solids]) @ R_WF
+    reach = np.array([bounding_radius(solid.shape) for solid in solids])[:, None]
+    lower, upper = (centres - reach).min(axis=0), (centres + reach).max(axis=0)
+    return SE3(R_WF, R_WF @ ((lower + upper) / 2)), (upper - lower)[:2] / 2
 
 
-def _with_walls(scene: SceneState, X_WF: SE3) -> SceneState:
-    """Four walls around the z axis of frame F."""
-    inner = WRIST_RADIUS + ROOM
+def _with_walls(scene: SceneState, X_WF: SE3, half: np.ndarray) -> SceneState:
+    """Four walls around the z axis of frame F, ROOM outside half extents (2,) along its x and y."""
+    inner = half + ROOM
     fixtures = dict(scene.scenario.fixtures)
     for number in range(4):
-        turn = SE3(_quarter_turns(number), np.zeros(3))
-        X_WO = X_WF * turn * SE3(np.eye(3), np.array([inner + THICKNESS / 2, 0.0, 0.0]))
-        shape = Box((THICKNESS, 2 * (inner + THICKNESS), LENGTH))
+        away, across = inner if number % 2 == 0 else inner[::-1]
+        wall = SE3(np.eye(3), np.array([away + THICKNESS / 2, 0.0, 0.0]))
+        X_WO = X_WF * SE3(_quarter_turns(number), np.zeros(3)) * wall
+        shape = Box((THICKNESS, 2 * (float(across) + THICKNESS), LENGTH))
         fixtures[f"wall_{number}"] = Fixture(f"wall_{number}", shape, X_WO, 0.5, (0.5, 0.5, 0.5, 1.0))
     return replace(scene, scenario=replace(scene.scenario, fixtures=fixtures))
 

@@ -194,21 +194,29 @@ class Row:
 
 
 def rows(queries: Sequence[QueryResult]) -> list[Row]:
-    """The comparison, planner by planner; then the machine's own way, the compiled planner and pybullet-planning."""
-    found = [_row(name, queries, lambda q, name=name: [t for t in q.trials if t.planner == name]) for name in PLANNERS]
-    found.append(_row("compiled", queries, lambda q: q.compiled))
-    if any(query.pybullet for query in queries):
-        found.append(_row("pybullet-planning", queries, lambda q: q.pybullet or ()))
-    return found
+    """The comparison, planner by planner, then the compiled one and pybullet-planning."""
+    trials = [
+        (trial, query.shortest)
+        for query in queries
+        for trial in (*query.trials, *query.compiled, *(query.pybullet or ()))
+    ]
+    names = dict.fromkeys(trial.planner for trial, _ in trials)
+    return [_row(name, [case for case in trials if case[0].planner == name]) for name in names]
 
 
-def _row(name: str, queries: Sequence[QueryResult], trials_of: Callable[[QueryResult], Sequence[Trial]]) -> Row:
-    cases = [(trial, query.shortest) for query in queries for trial in trials_of(query)]
+def _row(name: str, cases: Sequence[tuple[Trial, float]]) -> Row:
+    """Of trials of one planner, each with the length of the shortest path known."""
     seconds = [1e3 * (trial.found_s + trial.short_s) for trial, _ in cases]
     solved = [(trial.length / shortest, trial.short / shortest) for trial, shortest in cases if trial.is_found]
     length, short = np.median(solved, axis=0) if solved else (math.nan, math.nan)
-    share = len(solved) / max(1, len(cases))
-    return Row(name, share, float(np.median(seconds)), float(np.percentile(seconds, 95)), float(length), float(short))
+    return Row(
+        name,
+        len(solved) / len(cases),
+        float(np.median(seconds)),
+        float(np.percentile(seconds, 95)),
+        float(length),
+        float(short),
+    )
 
 
 def answer(queries: Sequence[QueryResult]) -> str:

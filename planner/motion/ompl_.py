@@ -100,7 +100,7 @@ class _Edges(base.MotionValidator):
 
     def checkMotion(self, first: Any, second: Any) -> bool:
         """May the arm move straight from one state to the other?"""
-        return not self._spent() and self._checker.edge_is_free(np.array(first[0:7]), np.array(second[0:7]))
+        return not self._spent() and self._checker.edge_is_free(first[0:7], second[0:7])
 
     def _spent(self) -> bool:
         if self._checker.checks < self._last:

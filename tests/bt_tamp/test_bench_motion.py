@@ -125,8 +125,9 @@ def test_longer_searching_finds_no_longer_path(arena):
     assert np.linalg.norm(arena.query.goal - arena.scene.q) - 1e-9 <= best <= search(arena, "RRTConnect", 0).length
 
 
-def test_a_lowered_goal_collides_and_a_walled_one_is_free_but_out_of_reach(query, arena):
-    motion = MotionPlanner(arena.robot)
+def test_a_lowered_goal_collides_and_a_walled_one_is_free_but_out_of_reach(arena):
+    motion, query = MotionPlanner(arena.robot), table_query(0)
+    assert query is not None
     low, behind = lowered(motion, query), walled(motion, query)
     assert low is not None
     assert behind is not None
@@ -162,7 +163,7 @@ def test_the_paper_s_question_is_answered_with_ratios_of_bidirectional_to_one_wa
     assert "no query" in answer([_result(is_straight=True)])
 
 
-def test_lengths_are_told_by_the_shortest_path_known(capsys):
+def test_lengths_are_told_by_the_shortest_path_known():
     by_name = {row.planner: row for row in rows([_result()])}
     assert by_name["RRT"].length == pytest.approx(4.0 / 2.9)
     assert by_name["pybullet-planning"].median_ms == pytest.approx(1000.0)
