@@ -95,7 +95,7 @@ class SceneResult:
 def planned(quick: bool) -> list[Job]:
     """The scenes."""
     if quick:
-        return [Job(None, 2, 1, 0.0), *(Job(seed, 2, 1, 2.0 if seed < 3 else 0.0) for seed in range(5))]
+        return [Job(None, 1, 1, 0.0), *(Job(seed, 1, 1, 2.0 if seed < 3 else 0.0) for seed in range(4))]
     tables = (Job(seed, SEEDS, PYBULLET_SEEDS, BEST_S if seed < BEST_ON else 0.0) for seed in range(TABLES))
     return [Job(None, SEEDS, PYBULLET_SEEDS, 0.0), *tables]
 

@@ -19,7 +19,7 @@ from planner.motion.world import Margins, obstacles
 from sim.robot import RobotModel
 from sim.scene import SceneState
 
-MAX_CHECKS = 20_000
+MAX_CHECKS = 10_000
 """Configurations that a search may look at; planners that better their path use them all."""
 
 STEP = MotionSettings().step
