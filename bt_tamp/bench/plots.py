@@ -6,6 +6,7 @@ from typing import Any
 
 from bt_tamp.bench.control import PARTS, Cost, middle
 from bt_tamp.bench.drag import DragResult
+from bt_tamp.bench.motion import SceneResult, queries_of, rows
 from bt_tamp.bench.slide import SlideResult
 from bt_tamp.bench.tamp import CPU_WANTED, TampResult
 from bt_tamp.bench.wipe import WipeResult
@@ -97,11 +98,26 @@ def plot_tables(folder: Path, results: Sequence[TampResult]) -> list[Path]:
     return [_saved(figure, folder / "tamp.png")]
 
 
+def plot_planners(folder: Path, results: Sequence[SceneResult]) -> list[Path]:
+    """CPU time by length of the path, as found and after shortcutting: one point a planner."""
+    figure, (axes,) = _figure(1)
+    for row in rows(queries_of(results)):
+        line = axes.plot([row.median_ms] * 2, [row.length, row.short], linewidth=0.7)[0]
+        axes.plot(row.median_ms, row.length, "o", color=line.get_color(), label=f"{row.planner}, {row.solved:.0%}")
+        axes.plot(row.median_ms, row.short, "v", color=line.get_color())
+    axes.set_xscale("log")
+    axes.set_xlabel("CPU time of a query, ms (median)")
+    axes.set_ylabel("length by the shortest path known (● as found, ▼ shortened)")
+    axes.legend()
+    return [_saved(figure, folder / "motion.png")]
+
+
 PLOTS: Mapping[str, Callable[[Path, Sequence[Any]], list[Path]]] = {
     "force": plot_forces,
     "wipe": plot_wipes,
     "drag": plot_drags,
     "tamp": plot_tables,
+    "motion": plot_planners,
     "control": plot_costs,
 }
 """By benchmark. Each returns the PNG files it made, and raises ImportError without matplotlib."""

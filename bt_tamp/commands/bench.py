@@ -24,6 +24,7 @@ BENCHES = {
     "wipe": "random crumbs, the dustpan on each side of the table in turn: how many lie in it in the end",
     "drag": "random flat boxes: how many are dragged to an edge of their table and picked there",
     "tamp": "fig1 and random tables: planning time and plan length, and what is said of those that can't be cleared",
+    "motion": "the paper's motion planners on fig1's queries and random ones, beside pybullet-planning",
     "control": "cost of a control tick by part beside the bare physics step, and the real-time factor",
 }
 

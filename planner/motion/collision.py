@@ -10,6 +10,7 @@ from pinocchio import SE3
 from planner.motion.chain import chain, placement
 from planner.motion.kernels import edge_is_free, hand_contacts
 from planner.motion.tables import (
+    BOUND,
     BOX,
     COUNT,
     CYLINDER,
@@ -17,6 +18,7 @@ from planner.motion.tables import (
     FIRST,
     HALF,
     HULL,
+    KIND,
     LOWER,
     OBSTACLE_COLUMNS,
     PART,
@@ -26,8 +28,10 @@ from planner.motion.tables import (
     UPPER,
     ArmArrays,
     SceneArrays,
+    pack,
 )
-from planner.motion.world import Margins, Standing
+from planner.motion.world import Margins, Same, Standing
+from planner.refinement import Pair
 from scenarios.shapes import (
     Box,
     Convex,
@@ -59,8 +63,9 @@ _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z i
 class FastChecker:
     """Convex solids in numba, for planners: never calls free what the exact model calls a collision.
 
-    Where it may refuse what is free (by millimetres, near corners and rims) is told in `kernels`.
+    Where it may refuse what is free (by millimetres, near corners and rims) is told in `apart`.
     Link 0 never moves, so it is checked against the arm and the held body only, not against the scene.
+    packed: robot and scene as the kernels take them, see `tables.pack`.
     """
 
     def __init__(self, robot: RobotModel, scene: SceneState, margins: Margins | None = None) -> None:
@@ -68,7 +73,7 @@ class FastChecker:
         parts = part_names(robot, scene.held)
         self.checks = 0
         arm = _arm_arrays(robot, scene.opening, _held(scene))
-        self._tables = (*arm, *_scene_arrays(arm, parts, scene, margins))
+        self.packed = pack(arm, _scene_arrays(arm, parts, scene, margins))
 
     def is_free(self, q: np.ndarray) -> bool:
         """Is q (7,) within the joint limits and free of collision?"""
@@ -79,7 +84,7 @@ class FastChecker:
         # Copies: a read-only array is another type to numba, and would be compiled for anew.
         start = np.array(qa, dtype=float)
         end = start if qb is qa else np.array(qb, dtype=float)
-        free, checks = edge_is_free(start, end, JOINT_STEP, TRAVEL_STEP, *self._tables)
+        free, checks = edge_is_free(start, end, self.packed, JOINT_STEP, TRAVEL_STEP)
         self.checks += checks
         return free
 
@@ -103,6 +108,7 @@ def part_names(robot: RobotModel, held: Held | None) -> tuple[str, ...]:
     return robot.links if held is None else (*robot.links, held.name)
 
 
+@lru_cache(maxsize=64)
 def self_collision_pairs(parts: tuple[str, ...]) -> list[tuple[str, str]]:
     """Pairs of the robot's parts that can meet: the outer arm, hand and held body against the links further in.
 
@@ -157,14 +163,22 @@ _NO_CORNERS = np.zeros((0, 3))
 
 def _solid_row(shape: Convex, X: SE3, part: int) -> np.ndarray:
     """A row of a table of solids (SOLID_COLUMNS,), its corners not counted yet."""
-    row = np.zeros(SOLID_COLUMNS)
-    row[:HALF] = _kind(shape), part, bounding_radius(shape)
-    row[HALF:PLACE] = extents(shape) / 2
+    row = _shape_row(shape).copy()
+    row[PART] = part
+    row[PLACE : PLACE + 9], row[PLACE + 9 : FIRST] = X.rotation.ravel(), X.translation
     if isinstance(shape, Hull):
-        X = X * SE3(np.eye(3), middle(shape))
-        row[HALF - 1] = float(np.linalg.norm(shape.solid.vertices - middle(shape), axis=1).max())
+        row[PLACE + 9 : FIRST] = X.act(middle(shape))
+    return row
+
+
+@lru_cache(maxsize=1024)
+def _shape_row(shape: Convex) -> np.ndarray:
+    """A solid's row but for where it is and to what it belongs."""
+    row = np.zeros(SOLID_COLUMNS)
+    row[KIND], row[BOUND], row[HALF:PLACE] = _kind(shape), bounding_radius(shape), extents(shape) / 2
+    if isinstance(shape, Hull):
+        row[BOUND] = float(np.linalg.norm(shape.solid.vertices - middle(shape), axis=1).max())
         row[COUNT], row[FACES] = len(shape.solid.vertices), len(shape.solid.normals)
-    row[PLACE:FIRST] = placement(X)
     return row
 
 
@@ -218,9 +232,19 @@ def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | No
 @lru_cache(maxsize=64)
 def _obstacle_rows(standing: Standing) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     """Names, the table (n, OBSTACLE_COLUMNS) and that of its corners (h,3), as in `tables`."""
-    world = standing.obstacles
-    table, corners = placed_rows([(obstacle.shape, obstacle.X_WS) for obstacle in world])
-    return tuple(obstacle.name for obstacle in world), table, corners
+    groups = standing.groups
+    parts = [_group_rows(Same(group)) for group in groups]
+    table = np.concatenate([rows for rows, _ in parts])
+    before = np.cumsum([0, *(len(corners) for _, corners in parts[:-1])])
+    table[:, FIRST] += np.repeat(before, [len(rows) for rows, _ in parts])
+    names = tuple(obstacle.name for group in groups for obstacle in group)
+    return names, table, np.concatenate([corners for _, corners in parts])
+
+
+@lru_cache(maxsize=1024)
+def _group_rows(group: Same) -> tuple[np.ndarray, np.ndarray]:
+    (obstacles,) = group.things
+    return placed_rows([(obstacle.shape, obstacle.X_WS) for obstacle in obstacles])
 
 
 def placed_rows(solids: Sequence[tuple[Convex, SE3]]) -> tuple[np.ndarray, np.ndarray]:
@@ -234,25 +258,36 @@ def placed_rows(solids: Sequence[tuple[Convex, SE3]]) -> tuple[np.ndarray, np.nd
     return table, _with_corners(table, [shape for shape, _ in solids])
 
 
+class _OwnPairs(NamedTuple):
+    """Pairs of the robot's parts. Rows (k,3), (l,3) of two links, of a solid and a link: their pair's number, both."""
+
+    pairs: list[Pair]
+    links: np.ndarray
+    solids: np.ndarray
+
+
+@lru_cache(maxsize=64)
+def _own_pairs(parts: tuple[str, ...], riders: tuple[float, ...]) -> _OwnPairs:
+    """riders: the part that each solid belongs to."""
+    pairs = self_collision_pairs(parts)
+    links, solids = [], []
+    for n, (outer, inner) in enumerate(pairs):
+        a, b = parts.index(outer), parts.index(inner)
+        if a < ARM_LINKS:
+            links.append((n, a, b))
+        else:
+            solids += [(n, s, b) for s, part in enumerate(riders) if part == a]
+    rows = (np.array(table, dtype=float).reshape(-1, 3) for table in (links, solids))
+    return _OwnPairs([frozenset(pair) for pair in pairs], *rows)
+
+
 def _scene_arrays(arm: ArmArrays, parts: tuple[str, ...], scene: SceneState, margins: Margins) -> SceneArrays:
     names, table, corners = _obstacle_rows(Standing(scene))
-    links, solids = [], []
-    for outer, inner in self_collision_pairs(parts):
-        margin = margins.within_robot(outer, inner)
-        a, b = parts.index(outer), parts.index(inner)
-        if margin == -np.inf:
-            continue
-        if a < ARM_LINKS:
-            links.append((a, b, margin))
-        else:
-            solids += [(s, b, margin) for s, part in enumerate(arm.solids[:, PART]) if part == a]
-    return SceneArrays(
-        obstacles=table,
-        corners=corners,
-        margins=margins.table(parts, names),
-        link_pairs=np.array(links, dtype=float).reshape(-1, 3),
-        solid_pairs=np.array(solids, dtype=float).reshape(-1, 3),
-    )
+    own = _own_pairs(parts, tuple(arm.solids[:, PART].tolist()))
+    within = margins.within_robot(own.pairs)
+    pairs = [np.column_stack([rows[:, 1:], within[rows[:, 0].astype(int)]]) for rows in (own.links, own.solids)]
+    watched = [rows[rows[:, 2] > -np.inf] for rows in pairs]
+    return SceneArrays(table, corners, margins.table(parts, names), *watched)
 
 
 def clear_of(

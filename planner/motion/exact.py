@@ -16,7 +16,7 @@ from pinocchio import SE3
 from planner.motion.broad import near_pairs, place_solids
 from planner.motion.chain import place_links
 from planner.motion.collision import ARM_LINKS, part_names, self_collision_pairs
-from planner.motion.world import Margins, Standing
+from planner.motion.world import Margins, Same, Standing
 from planner.refinement import Pair
 from scenarios.shapes import Convex, Hull, convex_parts, extents, middle
 from scenarios.solids import geometry, polytope
@@ -53,15 +53,33 @@ class _Solid:
 _UNTURNED = np.eye(3)
 
 
+class _PlacedGroup(NamedTuple):
+    """Solids of a group of obstacles, their coal transforms, world bounds lower, upper (o,3)."""
+
+    solids: list[_Solid]
+    transforms: list[Any]
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+@lru_cache(maxsize=1024)
+def _placed_group(group: Same) -> _PlacedGroup:
+    solids = [_solid(o.name, -1, o.X_WS, o.shape) for o in group.things[0]]
+    transforms = [coal.Transform3s(solid.X.rotation, solid.X.translation) for solid in solids]
+    centres = np.array([solid.X.translation for solid in solids])
+    reach = np.array([np.abs(solid.X.rotation) @ solid.half for solid in solids])
+    return _PlacedGroup(solids, transforms, centres - reach, centres + reach)
+
+
 class _Fixed:
     """What stands in the scene: solids, their coal transforms, world bounds lower, upper (1,o,3)."""
 
     def __init__(self, standing: Standing) -> None:
-        self.solids = [_solid(o.name, -1, o.X_WS, o.shape) for o in standing.obstacles]
-        self.transforms = [coal.Transform3s(solid.X.rotation, solid.X.translation) for solid in self.solids]
-        centres = np.array([solid.X.translation for solid in self.solids])
-        reach = np.array([np.abs(solid.X.rotation) @ solid.half for solid in self.solids])
-        self.lower, self.upper = (centres - reach)[None], (centres + reach)[None]
+        groups = [_placed_group(Same(group)) for group in standing.groups]
+        self.solids = [solid for group in groups for solid in group.solids]
+        self.transforms = [transform for group in groups for transform in group.transforms]
+        self.lower = np.concatenate([group.lower for group in groups])[None]
+        self.upper = np.concatenate([group.upper for group in groups])[None]
 
 
 class _Moving:
@@ -219,7 +237,7 @@ def _outward_pairs(
 def _inward_pairs(parts: tuple[str, ...], names: tuple[str, ...], margins: Margins) -> _Pairs:
     """The robot's own solids against each other."""
     pairs, rows, a, b = _inward_numbers(parts, names)
-    margin = np.array([margins.within_robot(*pair) for pair in pairs])[rows]
+    margin = margins.within_robot(pairs)[rows]
     kept = margin > -np.inf
     return _Pairs(a[kept], b[kept], margin[kept])
 
@@ -227,13 +245,13 @@ def _inward_pairs(parts: tuple[str, ...], names: tuple[str, ...], margins: Margi
 @lru_cache(maxsize=64)
 def _inward_numbers(
     parts: tuple[str, ...], names: tuple[str, ...]
-) -> tuple[list[tuple[str, str]], np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[list[Pair], np.ndarray, np.ndarray, np.ndarray]:
     """The pairs of parts, and for each pair of their solids: its pair's row, and the two numbers."""
     pairs = self_collision_pairs(parts)
     solids = {part: [k for k, name in enumerate(names) if name == part] for part in parts}
     found = [(row, a, b) for row, (first, second) in enumerate(pairs) for a in solids[first] for b in solids[second]]
     rows, a, b = (np.array(column) for column in zip(*found, strict=True))
-    return pairs, rows, a, b
+    return [frozenset(pair) for pair in pairs], rows, a, b
 
 
 @lru_cache(maxsize=64)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from pinocchio import SE3
@@ -48,6 +49,13 @@ class MotionSettings:
     margin: float = FREE_MARGIN
     line_margin: float = 0.002
     audit_margin: float = 0.001
+
+
+class Ends(NamedTuple):
+    """The goals (7,) of a move that are free, and the margins to be kept on the way to them."""
+
+    goals: list[np.ndarray]
+    margins: Margins
 
 
 class MotionPlanner:
@@ -179,8 +187,36 @@ class MotionPlanner:
         pair may stay as near all the way, and hardly nearer. If there is no way with everything in place,
         but one without the movable bodies, those in that way are the culprits.
         """
-        self._queries += 1
-        seed = int(np.random.SeedSequence([self._seed, self._queries]).generate_state(1)[0])
+        seed, ends = self._next_seed(), self.ends(scene, q_goals, allowed)
+        if isinstance(ends, MotionFailure):
+            return ends
+        for attempt in range(_ATTEMPTS):
+            path = self._polyline(scene, ends, seed + attempt, max_checks)
+            if path is None:
+                return self._blocked(scene, ends, seed, max_checks)
+            trajectory = self._timed(scene, path, ends.margins)
+            if trajectory is not None:
+                return trajectory
+        return MotionFailure("no timed motion along the paths found keeps clear of everything")
+
+    def way(
+        self,
+        scene: SceneState,
+        q_goals: Sequence[np.ndarray],
+        allowed: frozenset[Pair] = NOTHING,
+        max_checks: int = 4000,
+    ) -> np.ndarray | MotionFailure:
+        """The polyline (n,7) that `move` begins with, shortened but not timed; nobody is sought who is in the way."""
+        seed, ends = self._next_seed(), self.ends(scene, q_goals, allowed)
+        if isinstance(ends, MotionFailure):
+            return ends
+        path = self._polyline(scene, ends, seed, max_checks)
+        return MotionFailure(f"no path within {max_checks} checks") if path is None else path
+
+    def ends(
+        self, scene: SceneState, q_goals: Sequence[np.ndarray], allowed: frozenset[Pair] = NOTHING
+    ) -> Ends | MotionFailure:
+        """Which of the goals (7,) a move from scene.q may have, with which margins, or why there is none."""
         margins = Margins(self.settings.margin, allowed)
         near = self._near(scene, scene.q, margins)
         deep = [contact for contact in near if contact.distance < DEEPEST]
@@ -188,16 +224,11 @@ class MotionPlanner:
             return blame("the arm starts in collision:", deep, movables(scene))
         margins = _relaxed(margins, near)
         goals = self._free_goals(scene, q_goals, margins)
-        if isinstance(goals, MotionFailure):
-            return goals
-        for attempt in range(_ATTEMPTS):
-            path = self._polyline(scene, goals, margins, seed + attempt, max_checks)
-            if path is None:
-                return self._blocked(scene, goals, margins, seed, max_checks)
-            trajectory = self._timed(scene, path, margins)
-            if trajectory is not None:
-                return trajectory
-        return MotionFailure("no timed motion along the paths found keeps clear of everything")
+        return goals if isinstance(goals, MotionFailure) else Ends(goals, margins)
+
+    def _next_seed(self) -> int:
+        self._queries += 1
+        return int(np.random.SeedSequence([self._seed, self._queries]).generate_state(1)[0])
 
     def _track(self, path: CartesianPath, near: np.ndarray | None) -> list[np.ndarray]:
         self.work.add("ik", len(path.p_WG))
@@ -216,10 +247,8 @@ class MotionPlanner:
         failures = [blame("the goal is in collision:", contacts, movables(scene)) for contacts in hits]
         return min(failures, key=lambda failure: len(failure.culprits) or np.inf)
 
-    def _polyline(
-        self, scene: SceneState, goals: list[np.ndarray], margins: Margins, seed: int, max_checks: int
-    ) -> np.ndarray | None:
-        checker, reached = self._checker(scene, goals, margins)
+    def _polyline(self, scene: SceneState, ends: Ends, seed: int, max_checks: int) -> np.ndarray | None:
+        checker, reached = self._checker(scene, ends)
         path = next((np.stack([scene.q, q]) for q in reached if checker.edge_is_free(scene.q, q)), None)
         if path is None:
             query = Query(scene.q, reached, self._limits, seed, max_checks)
@@ -229,29 +258,25 @@ class MotionPlanner:
         self.work.add("checks" if isinstance(checker, FastChecker) else "exact_checks", checker.checks)
         return path
 
-    def _checker(
-        self, scene: SceneState, goals: list[np.ndarray], margins: Margins
-    ) -> tuple[CollisionChecker, list[np.ndarray]]:
+    def _checker(self, scene: SceneState, ends: Ends) -> tuple[CollisionChecker, list[np.ndarray]]:
         """The fast model with the goals it accepts; the exact one if the fast refuses the start or every goal."""
-        fast = FastChecker(self.robot, scene, margins)
-        accepted = [q for q in goals if fast.is_free(q)]
+        fast = FastChecker(self.robot, scene, ends.margins)
+        accepted = [q for q in ends.goals if fast.is_free(q)]
         if accepted and fast.is_free(scene.q):
             return fast, accepted
-        return ExactChecker(self.robot, scene, margins), goals
+        return ExactChecker(self.robot, scene, ends.margins), ends.goals
 
-    def _blocked(
-        self, scene: SceneState, goals: list[np.ndarray], margins: Margins, seed: int, max_checks: int
-    ) -> Trajectory | MotionFailure:
+    def _blocked(self, scene: SceneState, ends: Ends, seed: int, max_checks: int) -> Trajectory | MotionFailure:
         """Who is in the way, once no path was found: a motion after all if the way without the movables hits none."""
         reason = f"no path within {max_checks} checks"
         movable = movables(scene)
-        path = self._polyline(scene.without(movable), goals, margins, seed, max_checks) if movable else None
+        path = self._polyline(scene.without(movable), ends, seed, max_checks) if movable else None
         if path is None:
             return MotionFailure(f"{reason}, whatever is moved aside")
-        contacts = self._contacts(scene, path, margins)
+        contacts = self._contacts(scene, path, ends.margins)
         if contacts:
             return blame(f"{reason}; the way without movable bodies hits", contacts, movable)
-        return self._timed(scene, path, margins) or MotionFailure(reason)
+        return self._timed(scene, path, ends.margins) or MotionFailure(reason)
 
     def _timed(self, scene: SceneState, path: np.ndarray, margins: Margins) -> Trajectory | None:
         margins = replace(margins, free=self.settings.audit_margin)

@@ -100,7 +100,7 @@ class _Edges(base.MotionValidator):
 
     def checkMotion(self, first: Any, second: Any) -> bool:
         """May the arm move straight from one state to the other?"""
-        return not self._spent() and self._checker.edge_is_free(np.array(first[0:7]), np.array(second[0:7]))
+        return not self._spent() and self._checker.edge_is_free(first[0:7], second[0:7])
 
     def _spent(self) -> bool:
         if self._checker.checks < self._last:
@@ -138,9 +138,17 @@ def _search(
     if not problem.hasExactSolution():
         return None
     solution: Any = problem.getSolutionPath()
-    path = np.array([state[0:7] for state in solution.getStates()])
-    # AORRTC may hand its path over from the goal's end.
-    return path if np.array_equal(path[0], query.start) else path[::-1]
+    return _from_start(np.array([state[0:7] for state in solution.getStates()]), query.start, checker)
+
+
+def _from_start(path: np.ndarray, start: np.ndarray, checker: CollisionChecker) -> np.ndarray | None:
+    """The path (n,7) as it leads from the start: AORRTC may hand it over from the goal's end, and where the straight
+    way is free it gives the goal twice."""
+    if np.array_equal(path[0], start):
+        return path
+    if np.array_equal(path[-1], start):
+        return path[::-1]
+    return np.stack([start, path[-1]]) if checker.edge_is_free(start, path[-1]) else None
 
 
 def _bounds(limits: np.ndarray) -> base.RealVectorBounds:

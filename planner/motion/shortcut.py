@@ -1,10 +1,17 @@
 """Shorter polylines from longer ones, by straight edges that are free."""
 
+from bisect import bisect_right
+from itertools import accumulate, pairwise
+from math import dist
+
 import numpy as np
 
 from planner.motion.checking import CollisionChecker
 
 TRIES = 40
+
+WORTH = 0.01
+"""Part of the path's length that a shortcut must save for its edge to be looked at."""
 
 
 def shortened(path: np.ndarray, checker: CollisionChecker, rng: np.random.Generator, tries: int = TRIES) -> np.ndarray:
@@ -13,27 +20,36 @@ def shortened(path: np.ndarray, checker: CollisionChecker, rng: np.random.Genera
     A random shortcut joins two points anywhere on the path (Geraerts, Overmars: Creating high-quality
     paths for motion planning, 2007).
     """
-    path = _without_detours(path, checker)
-    for _ in range(tries if len(path) > 2 else 0):
-        way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-        a, b = np.sort(rng.uniform(0.0, way[-1], 2))
-        i, j = np.searchsorted(way, [a, b], side="right") - 1
-        i, j = min(i, len(path) - 2), min(j, len(path) - 2)
-        if i == j:
+    points = _without_detours(list(path), checker)
+    way = _way(points)
+    for parts in rng.uniform(size=(tries if len(points) > 2 else 0, 2)):
+        first, second = sorted((parts * way[-1]).tolist())
+        i, qa = _at(points, way, first)
+        j, qb = _at(points, way, second)
+        if i == j or second - first - dist(qa, qb) < WORTH * way[-1]:
             continue
-        qa = path[i] + (path[i + 1] - path[i]) * (a - way[i]) / (way[i + 1] - way[i])
-        qb = path[j] + (path[j + 1] - path[j]) * (b - way[j]) / (way[j + 1] - way[j])
         if checker.edge_is_free(qa, qb):
-            path = np.concatenate([path[: i + 1], qa[None], qb[None], path[j + 1 :]])
-    return _without_detours(path, checker)
+            points = [*points[: i + 1], qa, qb, *points[j + 1 :]]
+            way = _way(points)
+    return np.array(_without_detours(points, checker))
 
 
-def _without_detours(path: np.ndarray, checker: CollisionChecker) -> np.ndarray:
-    kept, i = [path[0]], 0
-    while i < len(path) - 1:
-        j = len(path) - 1
-        while j > i + 1 and not checker.edge_is_free(path[i], path[j]):
+def _way(points: list[np.ndarray]) -> list[float]:
+    return list(accumulate((dist(a, b) for a, b in pairwise(points)), initial=0.0))
+
+
+def _at(points: list[np.ndarray], way: list[float], where: float) -> tuple[int, np.ndarray]:
+    """The stretch on which the point `where` rad along the path lies, and that point."""
+    i = min(bisect_right(way, where) - 1, len(points) - 2)
+    return i, points[i] + (points[i + 1] - points[i]) * ((where - way[i]) / (way[i + 1] - way[i]))
+
+
+def _without_detours(points: list[np.ndarray], checker: CollisionChecker) -> list[np.ndarray]:
+    kept, i = [points[0]], 0
+    while i < len(points) - 1:
+        j = len(points) - 1
+        while j > i + 1 and not checker.edge_is_free(points[i], points[j]):
             j -= 1
-        kept.append(path[j])
+        kept.append(points[j])
         i = j
-    return np.array(kept)
+    return kept

@@ -54,3 +54,11 @@ class SceneArrays(NamedTuple):
     margins: np.ndarray
     link_pairs: np.ndarray
     solid_pairs: np.ndarray
+
+
+def pack(arm: ArmArrays, scene: SceneArrays) -> np.ndarray:
+    """All tables in one array: first for each where it begins, its rows and its columns, then their numbers."""
+    tables = [np.atleast_2d(table) for table in (*arm, *scene)]
+    starts = np.cumsum([3 * len(tables), *(table.size for table in tables[:-1])])
+    header = [(start, *table.shape) for start, table in zip(starts, tables, strict=True)]
+    return np.concatenate([np.ravel(header), *(np.ravel(table) for table in tables)]).astype(float)

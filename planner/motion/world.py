@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import permutations
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from pinocchio import SE3
@@ -35,9 +35,32 @@ class Obstacle(NamedTuple):
     X_WS: SE3
 
 
-def _solids(name: str, shape: Shape, X_WO: SE3) -> list[Obstacle]:
+Group = tuple[Obstacle, ...]
+"""Obstacles that come together: a body's convex parts, or all that never moves."""
+
+
+class Same:
+    """Things as a key of caches: equal if they are the same objects."""
+
+    def __init__(self, *things: Any) -> None:
+        self.things = things
+        self._ids = tuple(id(thing) for thing in things)
+
+    def __hash__(self) -> int:
+        return hash(self._ids)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Same) and other._ids == self._ids
+
+
+def _solids(name: str, shape: Shape, X_WO: SE3) -> Group:
     """A body's convex parts."""
-    return [Obstacle(name, part, X_WO * X_OP) for part, X_OP in convex_parts(shape)]
+    return tuple(Obstacle(name, part, X_WO * X_OP) for part, X_OP in convex_parts(shape))
+
+
+@lru_cache(maxsize=1024)
+def _body(name: str, placed: Same) -> Group:
+    return _solids(name, *placed.things)
 
 
 def obstacles(scene: SceneState) -> list[Obstacle]:
@@ -45,10 +68,10 @@ def obstacles(scene: SceneState) -> list[Obstacle]:
     return Standing(scene).obstacles
 
 
-@lru_cache(maxsize=8)
-def _surroundings(declared: "_Declared") -> tuple[Obstacle, ...]:
+@lru_cache(maxsize=32)
+def _surroundings(declared: Same) -> Group:
     """What never moves: "floor", "pedestal" (if there is one), "table", each region's parts, each fixture."""
-    scenario = declared.scenario
+    scenario: Scenario = declared.things[0]
     depth = np.array([0.0, 0.0, floor_height(scenario) - _FLOOR_DEPTH / 2])
     found = [Obstacle(FLOOR, Box((_FLOOR_SIDE, _FLOOR_SIDE, _FLOOR_DEPTH)), SE3(np.eye(3), depth))]
     block = pedestal(scenario)
@@ -77,28 +100,17 @@ class Standing:
         return isinstance(other, Standing) and other._ids == self._ids
 
     @property
-    def obstacles(self) -> list[Obstacle]:
-        """Everything solid but the robot and what it holds: surroundings first, then the movable bodies."""
-        return [*_surroundings(_Declared(self.scenario)), *self.bodies]
+    def groups(self) -> list[Group]:
+        """Everything solid but the robot and what it holds: surroundings, then each movable body. A group that stood
+        in another scene already is the same object."""
+        declared = self.scenario.bodies
+        bodies = [_body(name, Same(declared[name].shape, X_WO)) for name, X_WO in self.poses]
+        return [_surroundings(Same(self.scenario)), *bodies]
 
     @property
-    def bodies(self) -> list[Obstacle]:
-        """The movable bodies."""
-        declared = self.scenario.bodies
-        return [solid for name, X_WO in self.poses for solid in _solids(name, declared[name].shape, X_WO)]
-
-
-class _Declared:
-    """A scenario as a key of caches: equal only to itself."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        self.scenario = scenario
-
-    def __hash__(self) -> int:
-        return id(self.scenario)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Declared) and other.scenario is self.scenario
+    def obstacles(self) -> list[Obstacle]:
+        """The same, one after the other."""
+        return [solid for group in self.groups for solid in group]
 
 
 def movables(scene: SceneState) -> frozenset[str]:
@@ -135,9 +147,13 @@ class Margins:
                     margins[rows, columns] = self._of(pair, self.free)
         return margins
 
-    def within_robot(self, first: str, second: str) -> float:
-        """Margin between two of the robot's own parts (or one and the held body); −inf if it is allowed."""
-        return self._of(frozenset((first, second)), 0.0)
+    def within_robot(self, own: Sequence[Pair]) -> np.ndarray:
+        """Margins (n,) between pairs of the robot's own parts (or one and the held body); −inf where allowed."""
+        margins = np.zeros(len(own))
+        if self.allowed or self.relaxed:
+            for k, pair in enumerate(own):
+                margins[k] = self._of(pair, 0.0)
+        return margins
 
     def _of(self, pair: Pair, default: float) -> float:
         if pair in self.allowed:

@@ -102,6 +102,20 @@ def test_the_numeric_solver_reaches_what_the_closed_form_reaches():
     assert reached == 8
 
 
+@settings(max_examples=15, derandomize=True, deadline=None)
+@given(configurations, st.integers(0, 1000))
+def test_what_the_numeric_solver_finds_is_among_the_closed_form_s_solutions(q, seed):
+    assume(min(abs(np.sin(q[1])), abs(np.sin(q[3])), abs(np.sin(q[5]))) > 0.1)
+    X_WG = ROBOT.X_WG(q)
+    near = q + np.random.default_rng(seed).normal(size=7) * 0.2
+    found = solve_numerically(ROBOT, X_WG, [near, q])
+    assert found is not None
+    assert _error(found, X_WG) < 1e-5
+    assume(min(abs(np.sin(found[1])), abs(np.sin(found[3])), abs(np.sin(found[5]))) > 0.05)
+    solutions = IK.follow(_wrists(X_WG, 8), np.full(8, _swivel(found)), np.arange(8))
+    assert np.abs(solutions - found).max(axis=1).min() < 1e-3
+
+
 @pytest.mark.filterwarnings("error")
 def test_the_numeric_solver_says_none_out_of_reach_and_warns_of_nothing():
     assert solve_numerically(ROBOT, SE3(np.eye(3), np.array([3.0, 0.0, 0.5])), [np.zeros(7) + 0.1]) is None

@@ -52,6 +52,16 @@ def test_every_planner_finds_a_free_path_and_the_same_one_again(name, robot, sce
     assert _is_free(first, robot, scene)
 
 
+@pytest.mark.parametrize("name", PLANNERS)
+def test_every_planner_s_path_leads_from_the_start_even_if_the_straight_way_is_free(name, checker, query):
+    goal = query.start + np.array([0.0, -0.3, 0.0, 0.0, 0.0, 0.0, 0.4])
+    assert checker.edge_is_free(query.start, goal)
+    path = plan_path(replace(query, goals=[goal], max_checks=2000), checker, PathSettings(name))
+    assert path is not None
+    assert np.array_equal(path[0], query.start)
+    assert np.array_equal(path[-1], goal)
+
+
 def test_another_seed_takes_another_path(checker, query):
     other = replace(query, seed=6)
     first, second = (plan_path(q, checker, PathSettings()) for q in (query, other))

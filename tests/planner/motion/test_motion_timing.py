@@ -89,6 +89,28 @@ def test_the_rates_are_those_that_toppra_finds(robot):
         _, expected, _ = TOPPRA(limits, path, gridpoints=grid, solver_wrapper="seidel").compute_parameterization(0, 0)
         rates = fastest_rates(grid, spline(grid, 1), spline(grid, 2), robot.v_max, robot.a_max)
         assert np.allclose(rates, expected, atol=2e-3)
+        ours, theirs = (float(np.sum(2 * np.diff(grid) / (r[1:] + r[:-1]))) for r in (rates, expected))
+        assert ours / theirs == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_timed_path_is_as_fast_as_toppra_makes_the_same_curve(robot):
+    toppra = pytest.importorskip("toppra")
+    from toppra.algorithm import TOPPRA
+    from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
+
+    v_max, a_max = SPEED * robot.v_max, SPEED * robot.a_max
+    limits = [
+        JointVelocityConstraint(np.stack([-v_max, v_max], axis=1)),
+        JointAccelerationConstraint(np.stack([-a_max, a_max], axis=1)),
+    ]
+    for seed in range(5):
+        ours = time_path(robot, _corners(seed))
+        # The motion's own points, closely spaced, are the curve to be timed.
+        way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(ours.q, axis=0), axis=1))])
+        kept = np.append(np.diff(way, prepend=-1.0)[:-1] > 1e-4, True)
+        path = toppra.SplineInterpolator(way[kept], ours.q[kept])
+        theirs = TOPPRA(limits, path, gridpoints=np.linspace(0.0, way[-1], 201), solver_wrapper="seidel")
+        assert ours.duration < 1.05 * theirs.compute_trajectory(0, 0).duration
 
 
 @pytest.fixture(scope="module")
