@@ -9,6 +9,7 @@ import pinocchio as pin
 from pinocchio import SE3
 
 from bt_tamp.executive.build import build_planner
+from bt_tamp.executive.seams import Seams
 from bt_tamp.options import RunOptions
 from planner.failure import MotionFailure
 from planner.motion.motion_planner import NOTHING, MotionPlanner
@@ -68,7 +69,7 @@ def plan_queries(name: str = SCENE) -> list[MotionQuery]:
 
     scenario = load_scenario(name)
     robot = RobotModel(scenario.robot.model, scenario.robot.X_WB)
-    thinker = build_planner(scenario, RunOptions(), robot, lambda kind, **data: None, Listening)
+    thinker = build_planner(scenario, RunOptions(), robot, lambda kind, **data: None, Seams(motion=Listening))
     scene = SceneState.initial(scenario, robot.gripper.stroke)
     thinker.planner.search.plan(scene, thinker.goal, np.random.default_rng([0, 7]), thinker.planner.thinking.work)
     return [query for query in Listening.asked if not np.allclose(query.goal, query.scene.q, atol=1e-6)]

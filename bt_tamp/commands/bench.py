@@ -1,5 +1,6 @@
 """Measure how well contact is controlled, what control costs, and how fast tables are planned. A table closes, and the
 figures to reach.
+"""Measure: contact, what control costs, how planning scales. A table closes, and the figures to reach.
 
 The exit code is 0 when everything was measured, whatever came of it: the last section tells that. What was measured
 before an interruption is told too.
@@ -26,6 +27,7 @@ BENCHES = {
     "tamp": "fig1 and random tables: planning time and plan length, and what is said of those that can't be cleared",
     "motion": "the paper's motion planners on fig1's queries and random ones, beside pybullet-planning",
     "control": "cost of a control tick by part beside the bare physics step, and the real-time factor",
+    "task": "task planning alone, 2 to 30 objects: CPU time, rounds and plan length, beside other ways to search",
 }
 
 
