@@ -1,5 +1,3 @@
-"""Measure how well contact is controlled, what control costs, and how fast tables are planned. A table closes, and the
-figures to reach.
 """Measure: contact, what control costs, how planning scales. A table closes, and the figures to reach.
 
 The exit code is 0 when everything was measured, whatever came of it: the last section tells that. What was measured
