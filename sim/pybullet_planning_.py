@@ -84,8 +84,7 @@ class PybulletPlanning(BulletPlant):
                 yield (*a, *b), margin
 
     def _found(self, name: str) -> list[tuple[int, int]]:
-        links = [(self._robot, link) for link, known in self._link_names.items() if known == name]
-        return links + [(body, -1) for body, known in self._names.items() if known == name]
+        return [part for part, known in self._names.items() if known == name]
 
     def _near(self, bodies: tuple[int, int, int, int], margin: float) -> bool:
         a, link_a, b, link_b = bodies
