@@ -13,16 +13,9 @@ from planner.task.situation import Situation, Spot
 from planner.task.symbols import GroundAction
 from sim.scene import SceneState
 
-MOST_REMEMBERED = 3
-"""Samples of an action that are remembered to have worked, the latest first."""
-
 
 class ActionRefiner:
-    """Refines single actions and remembers what worked: motions until `forget`, samples for as long as it lives.
-
-    A sample that worked is tried first wherever the rest of the scene has changed meanwhile: finding it is what costs,
-    and its motion has to begin elsewhere anyway as soon as anything before it in the plan is another.
-    """
+    """Refines single actions and remembers, until `forget`, what worked where."""
 
     def __init__(self, refiners: Refiners, learned: Learned) -> None:
         self._refiners = refiners
@@ -31,9 +24,10 @@ class ActionRefiner:
         self._worked: dict[tuple[GroundAction, Spot], tuple[Any, ...]] = {}
 
     def forget(self) -> None:
-        """Another scene was observed: motions may no longer be free, and nothing lies where a plan was to put it."""
+        """Start afresh, for another observed scene: what was carried out meanwhile (how hard something had to be pressed)
+        has taught more than what was planned, and `Learned` keeps that."""
         self._refined.clear()
-        self._worked = {place: samples for place, samples in self._worked.items() if place[1].left_by is None}
+        self._worked.clear()
 
     def refine(
         self,
@@ -65,7 +59,7 @@ class ActionRefiner:
         if isinstance(outcome, Refinement):
             self._refined[key] = outcome
             earlier = (sample for sample in self._worked.get(place, ()) if sample != outcome.sample)
-            self._worked[place] = (outcome.sample, *earlier)[:MOST_REMEMBERED]
+            self._worked[place] = (outcome.sample, *earlier)
         return outcome, hints.first
 
     def _outcome(

@@ -160,7 +160,7 @@ COLUMNS = (
     ("p95", 7, lambda rs: f"{np.percentile([r.cpu_s for r in rs], 95):.2f}"),
     ("max", 7, lambda rs: f"{max(r.cpu_s for r in rs):.2f}"),
     ("rounds", 7, lambda rs: f"{statistics.mean(r.rounds for r in rs):.1f}"),
-    ("length", 7, lambda rs: f"{max((r.steps / r.shortest for r in rs if r.shortest), default=0.0):.2f}"),
+    ("length", 7, lambda rs: _longest([r.steps / r.shortest for r in rs if r.shortest])),
 )
 """Heading, width and text of each column, for the results of a group."""
 
@@ -173,11 +173,15 @@ def _count(those: Iterable[bool]) -> str:
     return str(sum(those) or "–")
 
 
+def _longest(ratios: Sequence[float]) -> str:
+    return f"{max(ratios):.2f}" if ratios else "–"
+
+
 def print_results(console: Console, results: Sequence[TampResult]) -> None:
     """One row a group of tables, then every table that fell short."""
-    lines = [f"{'tables':28}" + "".join(f"{name:>{width}}" for name, width, _ in COLUMNS)]
+    lines = [f"{'tables':30}" + "".join(f"{name:>{width}}" for name, width, _ in COLUMNS)]
     for group in groups(results):
-        lines.append(f"{group.title:28}" + "".join(f"{text(group.results):>{width}}" for _, width, text in COLUMNS))
+        lines.append(f"{group.title:30}" + "".join(f"{text(group.results):>{width}}" for _, width, text in COLUMNS))
     console.print("\n".join([*lines, NOTES, *shortcomings(results)]), highlight=False, markup=False, soft_wrap=True)
 
 

@@ -598,15 +598,3 @@ def test_where_bodies_are_in_the_way_the_grasp_on_what_is_held_is_exchanged_once
     assert taken(solution)[-2:] == ["mug", "cup"]
     assert {event["to"] for event in run.of("backtracked")} <= {str(PICK_CUP), "pick(cup, dustpan)"}
     assert len(run.of("backtracked")) == len(run.rounds) - 1
-
-
-def test_what_worked_in_one_plan_is_tried_first_in_the_next(tabletop, stand_in):
-    def pick_cup(sample, scene):
-        return None if sample == 3 else set()
-
-    skill = stand_in(rule(pick_cup=pick_cup))
-    run = Run(skill)
-    scene = tabletop("cup mug")
-    run.plan(scene, CUP_AWAY)
-    run.plan(shifted(scene, "mug", 0.05), CUP_AWAY)
-    assert [samples for action, samples, _ in skill.calls if action == str(PICK_CUP)] == [[0, 1, 2, 3], [3]]

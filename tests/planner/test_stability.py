@@ -104,12 +104,27 @@ def test_a_ball_is_put_into_a_bin_but_not_onto_an_open_table():
     assert next(placements(Sphere(0.03), HELD, OPEN, rng), None) is None
 
 
+def anywhere(placement):
+    """Nothing speaks against any placement."""
+    return True
+
+
+def test_placements_that_something_speaks_against_come_last():
+    body = Body("it", _cup(), 0.1, 0.5, (1.0, 1.0, 1.0, 1.0), SE3.Identity())
+    drawn = list(placements(body.shape, HELD, FLOOR, np.random.default_rng(0)))
+    left = [sample for sample in drawn if sample.rest[1] < 0.0]
+    found = list(clear_first(drawn, body, [], lambda sample: sample.rest[1] < 0.0))
+    assert 0 < len(left) < len(drawn)
+    assert found[: len(left)] == left
+    assert set(found) == set(drawn)
+
+
 def test_a_bin_is_packed_one_beside_the_other_without_overlap():
     rng = np.random.default_rng(3)
     packed = []
     for k, shape in enumerate([Box((0.1, 0.08, 0.06)), _cup(), _pyramid(0.05), Cylinder(0.04, 0.1), _leaning()]):
         body = Body(f"it{k}", shape, 0.1, 0.5, (1.0, 1.0, 1.0, 1.0), SE3.Identity())
-        placement = next(clear_first(placements(shape, HELD, FLOOR, rng), body, packed))
+        placement = next(clear_first(placements(shape, HELD, FLOOR, rng), body, packed, anywhere))
         packed.append(body_solid(body, placement.X_WO_rest))
     assert not any(overlap(a, b, 0.002) for i, a in enumerate(packed) for b in packed[:i])
 
@@ -118,4 +133,4 @@ def test_where_there_is_no_room_placements_still_come_to_name_what_is_in_the_way
     full = Body("full", Box((0.34, 0.34, 0.1)), 0.1, 0.5, (1.0, 1.0, 1.0, 1.0), SE3(np.eye(3), np.array([0, 0, 0.05])))
     body = Body("it", _cup(), 0.1, 0.5, (1.0, 1.0, 1.0, 1.0), SE3.Identity())
     drawn = list(placements(body.shape, HELD, FLOOR, np.random.default_rng(0)))
-    assert list(clear_first(drawn, body, [body_solid(full)])) == drawn
+    assert list(clear_first(drawn, body, [body_solid(full)], anywhere)) == drawn
