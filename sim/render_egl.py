@@ -9,6 +9,7 @@ import subprocess
 import sys
 from functools import cache
 
+import numpy as np
 import pybullet as p
 
 PROBE_SECONDS = 30.0
@@ -48,7 +49,7 @@ def _red_in_the_middle() -> bool:
     picture = p.getCameraImage(64, 64, view, projection, renderer=p.ER_BULLET_HARDWARE_OPENGL, physicsClientId=client)[
         2
     ]
-    r, g, b = (int(value) for value in picture[32][32][:3])
+    r, g, b = (int(value) for value in np.reshape(picture, (64, 64, 4))[32, 32, :3])
     return r > 2 * g + 20 and r > 2 * b + 20
 
 
