@@ -7,7 +7,7 @@ counts expansions itself.
 
 import logging
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,11 +22,18 @@ SMALL = 40
 SMALL_EXPANSIONS = 300
 """Nodes after which `auto` gives up A* with h^max and goes on with weighted A* and h^FF."""
 
-WEIGHT = 5
+WEIGHT = 5.0
 """Weight of the heuristic in weighted A*."""
 
+FINER = (1.5, 1.2)
+"""Weights with which `auto` looks for a shorter plan once it has one (as Richter, Thayer and Ruml, The Joy of Forgetting,
+2010: each search begins anew, but what the heuristic said of a state is kept)."""
+
+FINER_EXPANSIONS = 400
+"""Nodes that this may take for one plan."""
+
 SEARCHES = ("auto", "astar-hmax", "wastar-hff", "gbfs-hff", "astar-blind")
-"""auto: A* with h^max (optimal) while that is quick, then weighted A* with h^FF."""
+"""auto: A* with h^max (optimal) while that is quick, then weighted A* with h^FF, first coarse, then finer."""
 
 
 class PyperplanPlanner:
@@ -45,21 +52,23 @@ class PyperplanPlanner:
         domain = read_domain(domain_text)
         problem = read_problem(problem_text, domain)
         library = _pyperplan()
-        task = _numbered(library, domain_text, problem_text)
-        limit = max_expansions
-        if self._search == "auto" and len(task.operators) <= SMALL:
-            searches = [("astar-hmax", min(SMALL_EXPANSIONS, max_expansions)), ("wastar-hff", max_expansions)]
-        else:
-            searches = [("wastar-hff" if self._search == "auto" else self._search, max_expansions)]
-        expansions = 0
-        for name, limit in searches:
-            names, exhausted, count = _run(library, name, task, limit - expansions)
-            expansions += count
-            if names is not None:
-                return _checked(domain, problem, names, expansions)
-            if exhausted:
-                return NoTaskPlan(True, expansions)
-        return NoTaskPlan(False, expansions)
+        search = _Search(library, _numbered(library, domain_text, problem_text), max_expansions)
+        names = self._auto(search) if self._search == "auto" else search.run(self._search)
+        if names is not None:
+            return _checked(domain, problem, names, search.expansions)
+        return NoTaskPlan(search.is_exhausted, search.expansions)
+
+    def _auto(self, search: "_Search") -> list[str] | None:
+        if search.size <= SMALL:
+            names = search.run("astar-hmax", SMALL_EXPANSIONS)
+            if names is not None or search.is_exhausted:
+                return names
+        best = search.run("wastar-hff")
+        last = search.expansions + FINER_EXPANSIONS
+        for weight in FINER if best else ():
+            names = search.run("wastar-hff", last - search.expansions, weight)
+            best = names if names and len(names) < len(best) else best
+        return best
 
 
 class _OutOfExpansions(Exception):
@@ -84,9 +93,11 @@ class _Remembering:
 def _pyperplan() -> SimpleNamespace:
     """Pyperplan's parts, imported when first needed and given a logger of their own: they write to the root's."""
     from pyperplan import grounding, task
-    from pyperplan.heuristics import blind, relaxation
+    from pyperplan.heuristics import blind
     from pyperplan.pddl import parser
     from pyperplan.search import a_star
+
+    from planner.task.relaxed import RelaxedHeuristic
 
     quiet = logging.getLogger(__name__)
     quiet.setLevel(logging.ERROR)
@@ -94,7 +105,7 @@ def _pyperplan() -> SimpleNamespace:
     for module in modules:
         module.logging = quiet
     parts = {"grounding": grounding, "task": task, "parser": parser, "a_star": a_star}
-    return SimpleNamespace(**parts, blind=blind, relaxation=relaxation)
+    return SimpleNamespace(**parts, blind=blind, relaxed=RelaxedHeuristic)
 
 
 def _numbered(library: SimpleNamespace, domain_text: str, problem_text: str) -> Any:
@@ -117,41 +128,56 @@ def _numbered(library: SimpleNamespace, domain_text: str, problem_text: str) -> 
     return library.task.Task(grounded.name, facts, numbers(grounded.initial_state), numbers(grounded.goals), operators)
 
 
-def _run(library: SimpleNamespace, name: str, task: Any, limit: int) -> tuple[list[str] | None, bool, int]:
-    """Names of the plan's operators or None, was the space searched whole, and nodes expanded."""
-    count = 0
-    successors = library.task.Task.get_successor_states
+class _Search:
+    """Searches of one task, one after the other, that together expand `limit` nodes at most."""
 
-    def counted(state: frozenset[int]) -> list[Any]:
-        nonlocal count
-        if count >= limit:
-            raise _OutOfExpansions
-        count += 1
-        return successors(task, state)
+    def __init__(self, library: SimpleNamespace, task: Any, limit: int) -> None:
+        self.size = len(task.operators)
+        self.expansions = 0
+        self.is_exhausted = False
+        self._library = library
+        self._task = task
+        self._limit = limit
+        self._heuristics: dict[str, _Remembering] = {}
 
-    task.get_successor_states = counted
-    search, heuristic = _search(library, name)
-    try:
-        solution = search(task, _Remembering(heuristic(task)))
-    except _OutOfExpansions:
-        return None, False, count
-    return (None if solution is None else [operator.name for operator in solution]), True, count
+    def run(self, name: str, limit: int | None = None, weight: float = WEIGHT) -> list[str] | None:
+        """Names of a plan's operators, or None: the space was searched whole or so many nodes expanded."""
+        last = self._limit if limit is None else min(self._limit, self.expansions + limit)
+        successors = self._library.task.Task.get_successor_states
 
+        def counted(state: frozenset[int]) -> list[Any]:
+            if self.expansions >= last:
+                raise _OutOfExpansions
+            self.expansions += 1
+            return successors(self._task, state)
 
-def _search(library: SimpleNamespace, name: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    strategy, _, heuristic = name.partition("-")
-    a_star = library.a_star
-    searches = {
-        "astar": a_star.astar_search,
-        "wastar": lambda task, h: a_star.weighted_astar_search(task, h, weight=WEIGHT),
-        "gbfs": a_star.greedy_best_first_search,
-    }
-    heuristics = {
-        "hmax": library.relaxation.hMaxHeuristic,
-        "hff": library.relaxation.hFFHeuristic,
-        "blind": library.blind.BlindHeuristic,
-    }
-    return searches[strategy], heuristics[heuristic]
+        self._task.get_successor_states = counted
+        strategy, _, heuristic = name.partition("-")
+        try:
+            solution = self._strategy(strategy, weight)(self._task, self._heuristic(heuristic))
+        except _OutOfExpansions:
+            return None
+        self.is_exhausted = solution is None
+        return None if solution is None else [operator.name for operator in solution]
+
+    def _strategy(self, name: str, weight: float) -> Callable[..., Any]:
+        a_star = self._library.a_star
+        strategies = {
+            "astar": a_star.astar_search,
+            "wastar": partial(a_star.weighted_astar_search, weight=weight),
+            "gbfs": a_star.greedy_best_first_search,
+        }
+        return strategies[name]
+
+    def _heuristic(self, name: str) -> _Remembering:
+        if name not in self._heuristics:
+            heuristics = {
+                "hmax": partial(self._library.relaxed, is_max=True),
+                "hff": partial(self._library.relaxed, is_max=False),
+                "blind": self._library.blind.BlindHeuristic,
+            }
+            self._heuristics[name] = _Remembering(heuristics[name](self._task))
+        return self._heuristics[name]
 
 
 def _checked(domain: Domain, problem: Problem, names: list[str], expansions: int) -> TaskPlan:
