@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from bt_tamp.bench.control import PARTS, Cost, middle
 from bt_tamp.bench.drag import DragResult
 from bt_tamp.bench.slide import SlideResult
+from bt_tamp.bench.task import TaskResult, excess
 from bt_tamp.bench.wipe import WipeResult
 from sim.robot import GRAVITY
 
@@ -78,11 +80,32 @@ def plot_costs(folder: Path, runs: Sequence[Sequence[Cost]]) -> list[Path]:
     return [_saved(figure, folder / "control.png")]
 
 
+def plot_tasks(folder: Path, results: Sequence[TaskResult]) -> list[Path]:
+    """CPU time by number of objects, and how much longer than the shortest the plans are."""
+    figure, (above, below) = _figure(2, sharex=True)
+    sizes = [r.size for r in results]
+    above.semilogy(sizes, [median(r.calls) for r in results], "o", color="C0", label="a call")
+    above.semilogy(sizes, [sum(r.calls) for r in results], "x", color="C0", label="all rounds")
+    for color, label, cpu in (
+        ("C1", "all rounds, A*+h^max", "hmax_cpu"),
+        ("C3", "one after the other", "fallback_cpu"),
+    ):
+        asked = [(r.size, getattr(r, cpu)) for r in results if getattr(r, cpu) is not None]
+        above.semilogy([size for size, _ in asked], [cpu for _, cpu in asked], "+", color=color, label=label)
+    above.set_ylabel("CPU seconds")
+    above.legend(loc="upper left")
+    below.plot(sizes, [100 * excess(r) for r in results], "o", color="C2")
+    below.set_ylabel("longer than the shortest plan, %")
+    below.set_xlabel("objects")
+    return [_saved(figure, folder / "task.png")]
+
+
 PLOTS: Mapping[str, Callable[[Path, Sequence[Any]], list[Path]]] = {
     "force": plot_forces,
     "wipe": plot_wipes,
     "drag": plot_drags,
     "control": plot_costs,
+    "task": plot_tasks,
 }
 """By benchmark. Each returns the PNG files it made, and raises ImportError without matplotlib."""
 

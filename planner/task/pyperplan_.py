@@ -26,10 +26,10 @@ WEIGHT = 5.0
 """Weight of the heuristic in weighted A*."""
 
 FINER = (1.5, 1.2)
-"""Weights with which `auto` looks for a shorter plan once it has one (as Richter, Thayer and Ruml, The Joy of Forgetting,
-2010: each search begins anew, but what the heuristic said of a state is kept)."""
+"""Weights with which `auto` looks for a shorter plan once it has one. Each search begins anew, but what the heuristic
+said of a state is kept (Richter, Thayer, Ruml: The Joy of Forgetting, 2010)."""
 
-FINER_EXPANSIONS = 400
+FINER_EXPANSIONS = 250
 """Nodes that this may take for one plan."""
 
 SEARCHES = ("auto", "astar-hmax", "wastar-hff", "gbfs-hff", "astar-blind")
