@@ -83,7 +83,7 @@ def test_without_learning_plans_are_tried_until_one_happens_to_work():
     length, tried = first_that_works(DOMAIN, made, 20_000, Budget())
     assert length == 4
     assert tried > 1
-    assert first_that_works(DOMAIN, made, 10, Budget()) == (None, 0)
+    assert first_that_works(DOMAIN, made, 3, Budget()) == (None, 0)
 
 
 def test_beyond_its_bound_a_search_is_given_up():
