@@ -76,7 +76,7 @@ def restated(domain: Domain, problem: Problem) -> Any:
         task = Task(problem.name)
         for name, parameters in domain.predicates.items():
             task.add_fluent(Fluent(name, _signature=typed(parameters)), default_initial_value=False)
-        task.add_objects(Object(name, kind(type_)) for name, type_ in (domain.constants | problem.objects).items())
+        task.add_objects(Object(name, kind(type_)) for name, type_ in {**domain.constants, **problem.objects}.items())
         for schema in domain.actions:
             action = InstantaneousAction(schema.name, typed(schema.parameters))
             action.add_precondition(And([literal(fact, action) for fact in schema.preconditions]))

@@ -42,7 +42,9 @@ def plans(domain: Domain, scene: SceneState, goal: frozenset[Fact], max_expansio
     most = max(len(goal & step.adds) for step in steps)
     start = facts(scene, Anything())
     order = itertools.count()
-    heap = [(len(goal - start) / most, next(order), start, (), frozenset({start}))]
+    heap: list[tuple[float, int, frozenset[Fact], tuple[Step, ...], frozenset[frozenset[Fact]]]] = [
+        (len(goal - start) / most, next(order), start, (), frozenset({start}))
+    ]
     for _ in range(max_expansions):
         if not heap:
             return

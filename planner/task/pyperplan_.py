@@ -64,8 +64,10 @@ class PyperplanPlanner:
             if names is not None or search.is_exhausted:
                 return names
         best = search.run("wastar-hff")
+        if best is None:
+            return None
         last = search.expansions + FINER_EXPANSIONS
-        for weight in FINER if best else ():
+        for weight in FINER:
             names = search.run("wastar-hff", last - search.expansions, weight)
             best = names if names and len(names) < len(best) else best
         return best
