@@ -9,7 +9,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-SECONDS = 5
+SECONDS = 2
 """Limit of one search: a foreign process knows no counted one. What it has proven by then is told."""
 
 SEARCH = "astar(lmcut())"
