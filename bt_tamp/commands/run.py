@@ -69,7 +69,7 @@ def _beginning(arguments: argparse.Namespace) -> "tuple[Scenario, RunState | Non
     from bt_tamp.errors import UserError, refusing
 
     if (arguments.scene is None) == (arguments.resume is None):
-        raise UserError("name a scene, or a run's folder with --resume; one of them")
+        raise UserError("expected either a SCENE or --resume DIR")
     if arguments.resume is None:
         return scenario_of(arguments), None
 

@@ -118,8 +118,12 @@ class Driver:
             if coming.kind is None or coming.due is not None or coming.spot is not None:
                 continue
             kinds: dict[tuple[str, str], list[tuple[str, str]]] = {}
-            for refinement in self._machine.agenda.refinements:
+            refinements = self._machine.agenda.refinements
+            for refinement in refinements:
                 for phase in refinement.phases:
+                    # Once the last thing is let go of, there is nothing left that could go wrong.
+                    if refinement is refinements[-1] and phase.name == refinement.phases[-1].name:
+                        break
                     if coming.kind.fits(phase):
                         spots = kinds.setdefault((refinement.action.name, phase.name), [])
                         spots.append((str(refinement.action), phase.name))

@@ -81,7 +81,8 @@ def brought_back(now: Occasion, name: str, X_WO: SE3) -> Deed | None:
 
 def taken_for_good(now: Occasion) -> Deed | None:
     """An object that the goal is about is taken away and does not come back."""
-    for name in _shuffled(now, _lacking(now)):
+    in_hand = [now.held] if now.held is not None and now.held in _goal_bodies(now) else []
+    for name in [*_shuffled(now, _lacking(now)), *in_hand]:
         return Deed(f"{name} was taken away for good", (TakenAway(start=now.t, name=name),), names=(name,))
     return None
 

@@ -25,6 +25,9 @@ KEEP_REACH = 0.025
 PAD_DEPTH = 0.01
 FINGERS_AT_REST = 0.01
 
+OFF_STOP = 1e-3
+"""Rad by which a joint is believed off its stop, at least."""
+
 OLDEST = 1.0
 """Seconds for which it is remembered where the hand was: as late as a pose may be told."""
 
@@ -66,7 +69,11 @@ class Belief:
             held = Held(self._held, self._X_GO)
         else:
             self._X_GO = None
-        return SceneState(self._scenario, poses, observation.q, observation.opening, held)
+        return SceneState(self._scenario, poses, self._within_limits(observation.q), observation.opening, held)
+
+    def _within_limits(self, q: np.ndarray) -> np.ndarray:
+        """A joint that was pushed onto its stop, believed just off it: no motion could begin beyond a limit."""
+        return np.clip(q, self._robot.q_min + OFF_STOP, self._robot.q_max - OFF_STOP)
 
     def _poses(self, observation: Observation) -> dict[str, SE3]:
         """Every body that is seen, or was a moment ago."""

@@ -12,7 +12,7 @@ from bt_tamp.executive.rest import moving
 from planner.failure import ExecutionFailure, RefinementFailure
 from planner.refinement import Refinement, Work
 from planner.search_then_sample import NoPlan, SearchThenSample, Solution
-from planner.task.symbols import GroundAction
+from planner.task.symbols import Fact, GroundAction
 from sim.scene import SceneState, pose_distance
 from skills.context import SkillContext
 
@@ -95,6 +95,7 @@ class PlanNode(Behaviour):
         self._why = "planned"
         self._waits_for: tuple[str, ...] = ()
         self._scene = context.scene
+        self._pursued: frozenset[Fact] = frozenset()
 
     def initialise(self) -> None:
         self._outcome = None
@@ -114,13 +115,13 @@ class PlanNode(Behaviour):
                 return Status.RUNNING
             self._take_in_failure()
             before = thinking.simulated_cost()
-            self._scene = context.scene
+            self._scene, self._pursued = context.scene, self._agenda.pursued(context.scene)
             self._outcome = self._planner.plan(context.scene, self._agenda)
             self._ready_at = context.observation.t + thinking.simulated_cost() - before
         if context.observation.t < self._ready_at:
             return Status.RUNNING
         if isinstance(self._outcome, NoPlan):
-            if self._has_moved(context.scene):
+            if self._has_changed(context.scene):
                 self._outcome = None
                 return Status.RUNNING
             missing = self._agenda.missing(context.scene)
@@ -144,8 +145,10 @@ class PlanNode(Behaviour):
         self._why = "replanned"
         return Status.SUCCESS
 
-    def _has_moved(self, scene: SceneState) -> bool:
-        """Is the scene no longer the one that was planned in? Then what was found says nothing about it."""
+    def _has_changed(self, scene: SceneState) -> bool:
+        """Is the scene, or what is wanted, no longer what was planned for? Then what was found says nothing."""
+        if self._pursued != self._agenda.pursued(scene):
+            return True
         before = self._scene.poses
         if before.keys() != scene.poses.keys():
             return True

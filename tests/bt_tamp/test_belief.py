@@ -129,3 +129,11 @@ def test_a_bin_is_believed_where_it_is_seen(scenario):
     assert elsewhere == first.scenario.regions[name].X_WR
     assert again.scenario is first.scenario
     assert all(first.scenario.regions[other] is region for other, region in scenario.regions.items() if other != name)
+
+
+def test_an_arm_pushed_onto_a_joints_stop_can_still_plan_from_there(scenario):
+    q = scenario.robot.q0.copy()
+    q[5] = ROBOT.q_min[5] - 1e-4
+    believed = Belief(scenario, ROBOT).update(seen(scenario, 0.0, q=q), False).q
+    assert (believed > ROBOT.q_min).all()
+    np.testing.assert_allclose(believed, q, atol=2e-3)

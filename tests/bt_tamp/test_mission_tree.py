@@ -215,3 +215,45 @@ def test_the_rest_of_a_plan_is_judged_as_if_the_running_step_were_done():
     assert still_good_while(ROUTE, 0, frozenset())
     unreachable = TaskPlan(ROUTE.steps, frozenset({Fact("never")}))
     assert not still_good_while(unreachable, 0, frozenset({AT["start"]}))
+
+
+def test_another_goal_replaces_the_plan_even_in_the_middle_of_an_action():
+    world = World()
+    while "begin a" not in world.log:
+        world.tick()
+    world.route = TaskPlan(ROUTE.steps[:2], frozenset({AT["b"]}))
+    world.agenda.want(world.route.goal)
+    world.until_done()
+    assert world.log.count("plan") == 2
+    assert "begin c" not in world.log
+
+
+def test_what_comes_late_is_wanted_once_it_was_seen():
+    world = World()
+    agenda = Agenda(frozenset({AT["c"], AT["a"]}), {}, lambda _: frozenset(), str, str, frozenset({"a"}))
+    scene = SimpleNamespace(poses={}, scenario=SimpleNamespace(bodies={"a": None, "c": None}))
+    agenda.look_out(scene)
+    assert agenda.goal == {AT["c"]}
+    assert agenda.missing(scene) == ("c",)
+    assert agenda.pursued(scene) == frozenset()
+    scene.poses["a"] = scene.poses["c"] = "somewhere"
+    agenda.look_out(scene)
+    del scene.poses["a"]
+    assert agenda.goal == {AT["c"], AT["a"]}
+    assert agenda.missing(scene) == ("a",)
+    assert agenda.pursued(scene) == {AT["c"]}
+    assert world.agenda.goal == ROUTE.goal
+
+
+def test_without_watching_nothing_is_skipped_or_done_again_and_a_failure_is_a_failure():
+    world = World()
+    world.agenda.is_watchful = False
+    while "end a" not in world.log:
+        world.tick()
+    world.facts = frozenset({AT["b"]})
+    world.tick(20)
+    assert world.log.count("begin b") == 1
+    assert world.agenda.is_over
+    world.fails = True
+    world.context.fail(ExecutionFailure(ROUTE.steps[2].action, "it broke"))
+    assert world.agenda.review(world.context) == "it broke"

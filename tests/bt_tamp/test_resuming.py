@@ -44,7 +44,7 @@ def test_a_state_is_read_as_it_was_written_and_fits_its_scene_only(cut_short):
 @pytest.mark.parametrize("arguments", [[], ["fig2", "--resume", "runs/x"]])
 def test_a_run_begins_with_a_scene_or_where_another_ended(arguments, capsys):
     assert main(["run", *arguments]) == 2
-    assert capsys.readouterr().err == "bt-tamp: name a scene, or a run's folder with --resume; one of them\n"
+    assert capsys.readouterr().err == "bt-tamp: expected either a SCENE or --resume DIR\n"
 
 
 def test_a_folder_without_a_state_is_refused(tmp_path, capsys):

@@ -1,0 +1,105 @@
+"""Runs that something befalls: what is done is done to the world, told, and the same for the same seed."""
+
+import json
+
+import pytest
+
+from bt_tamp.cli import main
+from bt_tamp.disturb.classes import KINDS, amended
+from bt_tamp.disturb.names import CLASSES, can_be_reached, chosen
+from bt_tamp.report.result import RunResult
+from scenarios.library import scenario_path
+from scenarios.load import load_scenario
+
+DECLARED = """
+disturbances:
+  - {at: 0.1, move: {object: cube, by: [0.0, 0.03, 0.0]}}
+  - {at: 0.2, take: {object: sponge}}
+  - {phase: pre-grasp, push: {force: [100, 0, 0], seconds: 0.1}}
+  - {at: 1.2, bring: {object: sponge}}
+  - {at: 1.4, goal: "(in_bin sponge left_bin)"}
+"""
+
+
+def test_at_most_one_class_in_ten_is_hopeless_and_each_is_declared_and_done():
+    assert KINDS.keys() == CLASSES.keys()
+    hopeless = [name for name, declared in CLASSES.items() if not declared.is_reachable]
+    assert 0 < len(hopeless) <= len(CLASSES) / 10
+    assert can_be_reached(("moved", "push"))
+    assert not can_be_reached(("moved", "taken-for-good"))
+
+
+def test_classes_are_chosen_by_name_all_or_none():
+    assert chosen("moved, push,moved") == ("moved", "push")
+    assert chosen("all") == tuple(CLASSES)
+    assert chosen("none") == ()
+
+
+def test_what_will_come_is_part_of_the_scene_and_wanted_late():
+    scenario = amended(load_scenario("fig2"), ("new-object", "path-blocked"))
+    assert scenario.late == scenario.bodies.keys() - load_scenario("fig2").bodies.keys()
+    assert "(in_bin stray_box left_bin)" in scenario.goal
+    assert "post" not in scenario.goal
+
+
+@pytest.fixture(scope="module")
+def declared(tmp_path_factory):
+    """Two short runs of a scene that declares disturbances."""
+    folder = tmp_path_factory.mktemp("runs")
+    (folder / "scene.yaml").write_text(scenario_path("fig2").read_text() + DECLARED)
+    for name in ("one", "two"):
+        run = ["run", str(folder / "scene.yaml"), "--max-sim-time", "2.2", "--out", str(folder / name)]
+        assert main(run) in (0, 12)
+    return folder
+
+
+def test_a_scenes_disturbances_befall_its_run_in_order_and_are_recorded(declared):
+    result = RunResult.from_json((declared / "one" / "result.json").read_text())
+    assert [round(one.t, 1) for one in result.disturbances[:2]] == [0.1, 0.2]
+    said = [one.sentence for one in result.disturbances]
+    assert said[:2] == ["cube was moved", "sponge was taken away"]
+    assert "sponge appeared" in said
+    assert result.goal == {"in_bin(sponge, left_bin)": False}
+    assert set(json.loads((declared / "one" / "scenario.json").read_text())["late"]) == set()
+
+
+def test_a_disturbed_run_is_the_same_run_again(declared):
+    assert (declared / "one" / "events.jsonl").read_bytes() == (declared / "two" / "events.jsonl").read_bytes()
+
+
+def test_the_story_tells_what_was_done(declared, capsys):
+    assert main(["explain", str(declared / "one")]) == 0
+    told = capsys.readouterr().out
+    assert "DISTURBANCE" in told
+    assert "cube was moved" in told
+
+
+def test_the_film_shows_what_was_there(declared, tmp_path):
+    from bt_tamp.report.film import Filming, Recording, Shot
+
+    with Filming(Recording.load(declared / "one")) as filming:
+        assert (filming.take(Shot(0.15, 1.0)) != filming.take(Shot(0.8, 1.0))).any()
+    captions = Recording.load(declared / "one").timeline.notes
+    assert any("sponge was taken away" in words for note in captions for words in note.sentences)
+
+
+@pytest.mark.parametrize("name", ["push", "new-object", "task-planner"])
+def test_a_class_befalls_a_run_and_says_so(name, tmp_path):
+    run = ["run", "fig2", "--seed", "7", "--disturb", name, "--max-sim-time", "1.5", "--out", str(tmp_path / "run")]
+    assert main(run) in (0, 12)
+    result = RunResult.from_json((tmp_path / "run" / "result.json").read_text())
+    assert result.torque_limit_violations == 0
+    assert all(one.name == name for one in result.disturbances)
+    assert name != "task-planner" or len(result.disturbances) == 1
+
+
+def test_the_open_loop_baseline_ends_where_its_plan_fails(tmp_path):
+    (tmp_path / "scene.yaml").write_text(
+        scenario_path("fig2").read_text()
+        + "disturbances: [{phase: approach, action: pick, move: {object: sponge, by: [0.1, 0.0, 0.3]}}]\n"
+    )
+    run = ["run", str(tmp_path / "scene.yaml"), "--no-replan", "--out", str(tmp_path / "run")]
+    assert main(run) == 12
+    result = RunResult.from_json((tmp_path / "run" / "result.json").read_text())
+    assert result.reason.startswith("open loop: pick(sponge, dustpan) failed")
+    assert result.replans == 0
