@@ -130,8 +130,9 @@ def move(arena: Arena, seed: int) -> Move:
 
 def _anew(scene: SceneState) -> SceneState:
     """The same scene, the first thing in it put where it is: what was known of it is not known of this one."""
-    name, X_WO = next(iter(scene.poses.items()), (None, None))
-    return replace(scene) if X_WO is None else scene.moved(name, X_WO.copy())
+    for name, X_WO in scene.poses.items():
+        return scene.moved(name, X_WO.copy())
+    return replace(scene)
 
 
 class _Until:

@@ -114,8 +114,6 @@ def plot_planners(folder: Path, results: Sequence[SceneResult]) -> list[Path]:
     return [_saved(figure, folder / "motion.png")]
 
 
-
-
 def plot_tasks(folder: Path, results: Sequence[TaskResult]) -> list[Path]:
     """CPU time by number of objects, and how much longer than the shortest the plans are."""
     figure, (above, below) = _figure(2, sharex=True)

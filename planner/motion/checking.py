@@ -8,7 +8,8 @@ import numpy as np
 class CollisionChecker(Protocol):
     """One scene, one robot, one set of margins. `checks` counts the configurations looked at."""
 
-    checks: int
+    @property
+    def checks(self) -> int: ...
 
     def is_free(self, q: np.ndarray) -> bool:
         """Is q (7,) within the joint limits and free of collision?"""
