@@ -24,8 +24,8 @@ class ActionRefiner:
         self._worked: dict[tuple[GroundAction, Spot], tuple[Any, ...]] = {}
 
     def forget(self) -> None:
-        """Start afresh, for another observed scene: what was carried out meanwhile (how hard to press, say) has taught
-        more than what was planned, and `Learned` keeps that."""
+        """Start afresh, for another observed scene: what was carried out meanwhile (how hard something had to be
+        pressed) has taught more than what was planned, and `Learned` keeps that."""
         self._refined.clear()
         self._worked.clear()
 
