@@ -130,9 +130,10 @@ def move(arena: Arena, seed: int) -> Move:
 
 def _anew(scene: SceneState) -> SceneState:
     """The same scene, the first thing in it put where it is: what was known of it is not known of this one."""
-    for name, X_WO in scene.poses.items():
-        return scene.moved(name, X_WO.copy())
-    return replace(scene)
+    if not scene.poses:
+        return replace(scene)
+    name, X_WO = next(iter(scene.poses.items()))
+    return scene.moved(name, X_WO.copy())
 
 
 class _Until:

@@ -6,10 +6,12 @@ import numpy as np
 
 
 class CollisionChecker(Protocol):
-    """One scene, one robot, one set of margins. `checks` counts the configurations looked at."""
+    """One scene, one robot, one set of margins."""
 
     @property
-    def checks(self) -> int: ...
+    def checks(self) -> int:
+        """How many configurations were looked at."""
+        ...
 
     def is_free(self, q: np.ndarray) -> bool:
         """Is q (7,) within the joint limits and free of collision?"""
