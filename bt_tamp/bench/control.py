@@ -1,7 +1,7 @@
 """`bench control`: what one control tick costs, part by part, beside the bare physics that it drives."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -72,13 +72,10 @@ def planned(quick: bool) -> Sequence[int]:
     return SEEDS[:1] if quick else SEEDS
 
 
-def measure(seeds: Sequence[int], done: Callable[[Run], None]) -> list[Run]:
-    """Run them one after the other; `done` is told of each."""
-    runs = []
+def measure(seeds: Sequence[int]) -> Iterator[Run]:
+    """Run them one after the other."""
     for seed in seeds:
-        runs.append(run(seed))
-        done(runs[-1])
-    return runs
+        yield run(seed)
 
 
 def said(costs: Run) -> str:

@@ -1,7 +1,7 @@
 """`bench drag`: random flat boxes, each to be dragged to an edge of its table and picked there, by whole runs."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -95,13 +95,10 @@ def planned(quick: bool) -> list[Layout]:
     return list(layouts(QUICK if quick else COUNT))
 
 
-def measure(boxes: Sequence[Layout], done: Callable[[DragResult], None]) -> list[DragResult]:
-    """Run them one after the other; `done` is told of each."""
-    results = []
+def measure(boxes: Sequence[Layout]) -> Iterator[DragResult]:
+    """Run them one after the other."""
     for layout in boxes:
-        results.append(run_layout(layout))
-        done(results[-1])
-    return results
+        yield run_layout(layout)
 
 
 def run_layout(layout: Layout, seed: int = 0) -> DragResult:

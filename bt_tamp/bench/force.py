@@ -76,13 +76,10 @@ def _together() -> Iterator[tuple[str, Truth]]:
         yield f"{TOGETHER}: {signs}", Truth(height, TILT, friction, stiffness, masses)
 
 
-def measure(slides: Sequence[Case], told: Callable[[SlideResult], None]) -> list[SlideResult]:
-    """Run them one after the other; `told` hears of each."""
-    results = []
+def measure(slides: Sequence[Case]) -> Iterator[SlideResult]:
+    """Run them one after the other."""
     for case in slides:
-        results.append(run_slide(case))
-        told(results[-1])
-    return results
+        yield run_slide(case)
 
 
 def said(result: SlideResult) -> str:

@@ -3,7 +3,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -100,18 +100,15 @@ def planned(quick: bool) -> list[Job]:
     return [Job(None, SEEDS, PYBULLET_SEEDS, 0.0), *tables]
 
 
-def measure(jobs: Sequence[Job], done: Callable[[SceneResult], None]) -> list[SceneResult]:
-    """Run them one after the other; `done` is told of each. What is compiled at its first use is used before."""
+def measure(jobs: Sequence[Job]) -> Iterator[SceneResult]:
+    """Run them one after the other. What is compiled at its first use is used before."""
     for query in _queries(jobs[0])[:1]:
         _solve(query, Job(None, 1, 0, 0.0))
-    results = []
     for job in jobs:
         queries = _queries(job)
         solved = [result for query in queries if (result := _solve(query, job)) is not None]
         refusals = [] if job.table is None else [_refusal(hopeless) for query in queries for hopeless in _spoilt(query)]
-        results.append(SceneResult(job.name, tuple(solved), tuple(refusals)))
-        done(results[-1])
-    return results
+        yield SceneResult(job.name, tuple(solved), tuple(refusals))
 
 
 def _queries(job: Job) -> list[MotionQuery]:

@@ -1,7 +1,7 @@
 """`bench tamp`: task and motion planning of whole tables, and what becomes of those that can't be cleared."""
 
 import statistics
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -68,15 +68,12 @@ def planned(quick: bool) -> list[Case]:
     return list(cases(quick))
 
 
-def measure(tables: Sequence[Case], done: Callable[[TampResult], None]) -> list[TampResult]:
-    """Plan, or run, one after the other; `done` is told of each."""
+def measure(tables: Sequence[Case]) -> Iterator[TampResult]:
+    """Plan, or run, one after the other."""
     # Compiled code is loaded by what is planned first, which is not counted.
     preview(load_scenario("fig1"), RunOptions(), lambda kind, **data: None)
-    results = []
     for case in tables:
-        results.append(run_table(case) if case.part == "run" else plan_table(case))
-        done(results[-1])
-    return results
+        yield run_table(case) if case.part == "run" else plan_table(case)
 
 
 def plan_table(case: Case) -> TampResult:

@@ -6,7 +6,7 @@ nothing; and Fast Downward for what is proven of the shortest plan of each cours
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
@@ -99,8 +99,8 @@ def planned(quick: bool) -> list[Course]:
     return [random_course(size, seed) for size in sizes for seed in range(seeds)]
 
 
-def measure(courses: Sequence[Course], done: Callable[[TaskResult], None]) -> list[TaskResult]:
-    """Plan them one after the other; `done` is told of each.
+def measure(courses: Sequence[Course]) -> Iterator[TaskResult]:
+    """Plan them one after the other.
 
     A* with h^max and the fallback aren't asked any more once they found no plan for any course of some size.
     """
@@ -109,8 +109,7 @@ def measure(courses: Sequence[Course], done: Callable[[TaskResult], None]) -> li
     results: list[TaskResult] = []
     for course in courses:
         results.append(_measured(domain, course, _given_up(results, course.size)))
-        done(results[-1])
-    return results
+        yield results[-1]
 
 
 def plan_course(domain: Domain, course: Course, search: str, **options: Any) -> Tally:

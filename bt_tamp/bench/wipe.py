@@ -1,7 +1,7 @@
 """`bench wipe`: random crumbs, the dustpan on each side of the table in turn, wiped into it by whole runs."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -31,13 +31,10 @@ def planned(quick: bool) -> list[Layout]:
     return [*cubes(QUICK if quick else COUNT), *grains(GRAIN_QUICK if quick else GRAIN_COUNT)]
 
 
-def measure(layouts: Sequence[Layout], done: Callable[["WipeResult"], None]) -> list["WipeResult"]:
-    """Run them one after the other; `done` is told of each."""
-    results = []
+def measure(layouts: Sequence[Layout]) -> Iterator["WipeResult"]:
+    """Run them one after the other."""
     for layout in layouts:
-        results.append(run_layout(layout))
-        done(results[-1])
-    return results
+        yield run_layout(layout)
 
 
 @dataclass(frozen=True)

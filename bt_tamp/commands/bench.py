@@ -53,13 +53,10 @@ def call(arguments: argparse.Namespace) -> int:
     results: list[Any] = []
     interruption: KeyboardInterrupt | None = None
     with _progress(bench.WHAT, len(planned)) as advance:
-
-        def done(result: Any) -> None:
-            results.append(result)
-            advance(bench.said(result))
-
         try:
-            bench.measure(planned, done)
+            for result in bench.measure(planned):
+                results.append(result)
+                advance(bench.said(result))
         except KeyboardInterrupt as stopped:
             if not results:
                 raise

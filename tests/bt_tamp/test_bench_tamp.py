@@ -87,8 +87,8 @@ def test_an_unsolvable_table_is_told_to_be_so_and_why():
 
 
 def test_what_was_measured_before_an_interruption_is_printed_and_written(tmp_path, monkeypatch, capsys):
-    def interrupted(tables, done):
-        done(plan_table(HEAVY))
+    def interrupted(tables):
+        yield plan_table(HEAVY)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(tamp, "measure", interrupted)
