@@ -93,7 +93,9 @@ def run_job(job: Job) -> Finished:
         from bt_tamp.report.recorder import RunRecorder
         from scenarios.errors import SceneError
         from scenarios.load import load_scenario
+    from bt_tamp.garbage import collect_rarely
 
+    collect_rarely()
     try:
         scenario = amended(load_scenario(job.scene, job.options.seed), job.options.disturb)
         result = run_scenario(scenario, job.options, RunRecorder(scenario))

@@ -45,6 +45,9 @@ def call(arguments: argparse.Namespace) -> int:
 
     with quiet_imports():
         bench = import_module(f"bt_tamp.bench.{arguments.bench}")
+    from bt_tamp.garbage import collect_rarely
+
+    collect_rarely()
     from rich.console import Console
 
     from bt_tamp.bench.checks import print_checks, write_json

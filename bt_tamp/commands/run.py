@@ -49,8 +49,11 @@ def call(arguments: argparse.Namespace) -> int:
     with quiet_imports():
         from bt_tamp.disturb.classes import amended
         from bt_tamp.executive.loop import run_scenario
+    from bt_tamp.garbage import collect_rarely
     from bt_tamp.report.live import watcher
     from bt_tamp.report.recorder import RunRecorder
+
+    collect_rarely()
 
     scenario = amended(scenario, options.disturb)
     with RunRecorder(scenario, folder, watcher(sys.stdout)) as recorder:

@@ -200,9 +200,9 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
     controller, observation = context.controller, context.observation
     force = controller.contact_force if controller.contact else 0.0
     tally.peak_force_n = max(tally.peak_force_n, force)
-    power = float(np.abs(observation.tau) @ np.abs(observation.v))
-    tally.energy_j += power * CONTROL_EVERY * machine.plant.timestep
     if n % SAMPLE_EVERY == 0:
+        power = float(np.abs(observation.tau) @ np.abs(observation.v))
+        tally.energy_j += power * SAMPLE_EVERY * CONTROL_EVERY * machine.plant.timestep
         reference = controller.reference
         wanted = reference.force if reference else 0.0
         q_ref = reference.trajectory.at(controller.time_in_reference)[0] if reference else observation.q

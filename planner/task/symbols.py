@@ -1,11 +1,11 @@
 """Facts, ground actions and task plans."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True, order=True)
-class Fact:
-    """A ground positive literal, `in_bin(book, table)`."""
+class Fact(NamedTuple):
+    """A ground positive literal, `in_bin(book, table)`. A tuple, as sets of them are compared at every tick."""
 
     predicate: str
     args: tuple[str, ...] = ()
