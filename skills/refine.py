@@ -5,7 +5,7 @@ from py_trees.common import Status
 
 from planner.failure import RefinementFailure, SceneChanged
 from planner.motion.motion_planner import MotionPlanner
-from planner.refinement import Refinement
+from planner.refinement import Phase, Refinement
 from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
 from skills.payload import load_of
@@ -102,7 +102,8 @@ class Refine(Behaviour):
 
 
 class PathFree(Behaviour):
-    """Is the rest of the running motion still free? For motions in contact, which can't simply begin anew."""
+    """Is the rest of the running motion still free, and until contact what it is for still there? For motions in
+    contact, which can't simply begin anew."""
 
     def __init__(self, run: ActionRun, context: SkillContext, motion: MotionPlanner) -> None:
         super().__init__("path free?")
@@ -122,9 +123,17 @@ class PathFree(Behaviour):
         phase = self._run.running(context.phase)
         if phase is None:
             return Status.SUCCESS
-        blocked = self._watch.path_blocked(context.scene, phase, context.controller.time_in_reference)
-        if blocked is None:
+        changed = self._what_changed(self._watch, phase)
+        if changed is None:
             return Status.SUCCESS
-        context.fail(SceneChanged(self._run.action, blocked.reason, refinement.sample))
-        self.feedback_message = blocked.reason
+        context.fail(SceneChanged(self._run.action, changed, refinement.sample))
+        self.feedback_message = changed
         return Status.FAILURE
+
+    def _what_changed(self, watch: Watch, phase: Phase) -> str | None:
+        context = self._context
+        blocked = watch.path_blocked(context.scene, phase, context.controller.time_in_reference)
+        if blocked is not None:
+            return blocked.reason
+        is_coming = phase.kind == "touch" and not context.controller.contact
+        return watch.object_shifted(context.scene) if is_coming else None

@@ -106,3 +106,12 @@ def test_what_stirs_beside_the_stroke_does_not_end_it():
     assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
     nudge = shifted(bench, "box", 0.004, 0.0)
     assert carried_out(bench, "wipe(carrot, table, dustpan)", "descend", 0.1, nudge) is Status.SUCCESS
+
+
+def test_a_crumb_moved_while_the_sponge_comes_down_is_not_wiped_for_where_it_was():
+    bench = Bench(scene_with("carrot", "sponge"))
+    assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
+    status = carried_out(bench, "wipe(carrot, table, dustpan)", "descend", 0.3, shifted(bench, "carrot", -0.05, 0.15))
+    assert status is Status.FAILURE
+    assert isinstance(bench.context.failure, SceneChanged)
+    assert bench.context.failure.reason == "carrot was moved"
