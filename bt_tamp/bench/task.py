@@ -38,7 +38,7 @@ LARGEST = 30
 CPU, LONGER = 0.3, 0.05
 """Seconds of CPU time a call, and share beyond the shortest plan, with the most objects."""
 
-OPTIMAL_EXPANSIONS = 4000
+OPTIMAL_EXPANSIONS = 30_000
 """Nodes for one call of A* with h^max: more is giving up."""
 
 ENUMERATED_EXPANSIONS = 20_000

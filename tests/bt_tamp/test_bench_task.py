@@ -45,7 +45,7 @@ def test_the_shortest_plan_is_that_of_the_whole_search(shortest, made):
     assert plan_course(DOMAIN, made, "astar-hmax").steps == shortest
 
 
-@pytest.mark.parametrize("size", [2, 3, 6, 30])
+@pytest.mark.parametrize("size", [2, 3, 6, 12])
 def test_a_random_course_can_be_solved_and_no_plan_is_shorter_than_the_shortest(size):
     for seed in range(3 if size < 10 else 1):
         made = random_course(size, seed)
