@@ -5,31 +5,26 @@ couples the two fingers, as the gear does in the real gripper. Two frictions com
 """
 
 import math
-import tempfile
 import weakref
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Generic, TypeVar
+from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
 import pybullet as p
-import pybullet_data
 from pinocchio import SE3
 
 from scenarios.regions import parts
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, Shape
-from sim.bullet_shapes import add_collision_shape, add_visual_shape, principal_axes
+from sim.bullet_bodies import Color, add_body, resolved_urdf
+from sim.bullet_shapes import principal_axes
 from sim.contact import NORMAL_FORCE, Contact
+from sim.converted import Converted, pose_of
 from sim.plant import Command, GripCommand, Observation
 from sim.robot import GRAVITY, RobotModel
 from sim.scene import floor_height, pedestal
 from sim.window import frame_scene
 from sim.wrench import Wrench
-
-T = TypeVar("T")
 
 PHYSICS_STEP = 1e-3
 """Seconds a step: at 240 Hz a sponge held by friction turns in the hand."""
@@ -39,14 +34,6 @@ SOLVER_ITERATIONS = 50
 CONTACT_BREAKING = 0.002
 """Metres after which a contact point is given up. With Bullet's own 0.02 stale points under the pads let a book
 turn in the hand by 3° a second while everything stands still."""
-
-ROTATION_DAMPING = 2.0
-"""1/s at which a thing's turning dies away: without it a glass on its rim or a ball never come to rest. Bullet's own
-rolling friction does it too, but doubles the cost of every contact."""
-
-ASLEEP = 1e-6
-"""(m/s)² plus (rad/s)² below which, for two seconds, a thing is left out of the sums until something touches it or what
-it rests on moves: 1 mm/s. Bullet's own 0.05 would stop a ball that rolls at 0.2 m/s."""
 
 PAD_RESISTANCE = 0.003
 """Metres, before it is multiplied by the friction of what is held: lever of the force with which the pads resist
@@ -66,15 +53,6 @@ GEAR_DAMPING = 40.0
 """N s/m: damps the 0.1 kg fingers well and is stable at 1 kHz."""
 
 
-@contextmanager
-def resolved_urdf(robot: RobotModel) -> Iterator[str]:
-    """Path of a copy of the robot's URDF with `package://pybullet_data` replaced by where it is installed."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / robot.urdf.name
-        path.write_text(robot.urdf.read_text().replace("package://pybullet_data", pybullet_data.getDataPath()))
-        yield str(path)
-
-
 class BulletPlant:
     """A `Plant` for a scenario. Every quantity in SI units and in W unless said otherwise.
 
@@ -87,8 +65,8 @@ class BulletPlant:
         self.timestep = PHYSICS_STEP
         self._t = 0.0
         self._unseen = SEEN_EVERY
-        self._poses: _Converted[SE3] | None = None
-        self._velocities: _Converted[np.ndarray] | None = None
+        self._poses: Converted[SE3] | None = None
+        self._velocities: Converted[np.ndarray] | None = None
         self._client = p.connect(p.GUI if window else p.DIRECT)
         # A plant that nobody closed keeps its engine, 10 MB and more, until the process ends.
         self._free = weakref.finalize(self, p.disconnect, self._client)
@@ -135,7 +113,7 @@ class BulletPlant:
             regions=self._shifted,
         )
 
-    def _look(self) -> tuple["_Converted[SE3]", "_Converted[np.ndarray]"]:
+    def _look(self) -> tuple["Converted[SE3]", "Converted[np.ndarray]"]:
         if self._poses is not None and self._velocities is not None and self._unseen < SEEN_EVERY:
             return self._poses, self._velocities
         poses, velocities = {}, {}
@@ -149,8 +127,8 @@ class BulletPlant:
             poses[name] = position + quaternion
             velocities[name] = linear + angular
         self._unseen = 0
-        self._poses = _Converted(poses, _pose, self._poses)
-        self._velocities = _Converted(velocities, np.array, self._velocities)
+        self._poses = Converted(poses, pose_of, self._poses)
+        self._velocities = Converted(velocities, np.array, self._velocities)
         return self._poses, self._velocities
 
     def apply(self, command: Command) -> None:
@@ -299,44 +277,8 @@ class BulletPlant:
         known = ", ".join(n for i, n in sorted(self._link_names.items()) if i >= 0)
         raise ValueError(f"no moving link {name!r}, known: {known}")
 
-    def _add(
-        self, name: str, shape: Shape, X_WO: SE3, friction: float, mass: float, color: tuple[float, float, float, float]
-    ) -> int:
-        axes = principal_axes(shape)
-        pose = pin.SE3ToXYZQUAT(X_WO if axes is None else X_WO * axes[0])
-        X_IO = [0.0] * 6 + [1.0] if axes is None else pin.SE3ToXYZQUAT(axes[0].inverse()).tolist()
-        frame = {"visualFramePosition": X_IO[:3], "visualFrameOrientation": X_IO[3:]}
-        body = p.createMultiBody(
-            mass,
-            add_collision_shape(shape, self._client),
-            add_visual_shape(shape, self._client, rgbaColor=color, **frame),
-            list(pose[:3]),
-            list(pose[3:]),
-            # Maximal coordinates cost less. What stands fast does the same in both, but of what moves a pushed cube
-            # drifts aside by a tenth of its way and a pressed sponge rings by 5 % of the force.
-            useMaximalCoordinates=mass == 0.0,
-            physicsClientId=self._client,
-        )
-        if axes is not None:
-            # PyBullet would put a margin of 1 mm around every hull.
-            p.changeDynamics(
-                body,
-                -1,
-                collisionMargin=0.0,
-                localInertiaDiagonal=[mass * moment for moment in axes[1]],
-                physicsClientId=self._client,
-            )
-        p.changeDynamics(
-            body,
-            -1,
-            lateralFriction=friction,
-            restitution=0.0,
-            linearDamping=0.0,
-            angularDamping=ROTATION_DAMPING,
-            activationState=p.ACTIVATION_STATE_ENABLE_SLEEPING,
-            sleepThreshold=ASLEEP,
-            physicsClientId=self._client,
-        )
+    def _add(self, name: str, shape: Shape, X_WO: SE3, friction: float, mass: float, color: Color) -> int:
+        body = add_body(shape, X_WO, (mass, friction), color, self._client)
         self._names[body, -1] = name
         return body
 
@@ -433,34 +375,3 @@ class BulletPlant:
 
 def _nobody(part: str) -> None:
     """Takes no times."""
-
-
-class _Converted(Mapping[str, T], Generic[T]):
-    """What the engine said of each body, converted when it is asked for. What has not changed since `before` stays the
-    same object, which those who look at it know again."""
-
-    def __init__(
-        self,
-        raw: dict[str, tuple[float, ...]],
-        convert: Callable[[tuple[float, ...]], T],
-        before: "_Converted[T] | None",
-    ) -> None:
-        self._raw, self._convert = raw, convert
-        self._known: dict[str, T] = {}
-        if before is not None:
-            self._known = {name: known for name, known in before._known.items() if before._raw[name] == raw.get(name)}
-
-    def __getitem__(self, name: str) -> T:
-        if name not in self._known:
-            self._known[name] = self._convert(self._raw[name])
-        return self._known[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._raw)
-
-    def __len__(self) -> int:
-        return len(self._raw)
-
-
-def _pose(xyzquat: tuple[float, ...]) -> SE3:
-    return pin.XYZQUATToSE3(np.array(xyzquat))

@@ -15,7 +15,7 @@ from pinocchio import SE3
 from scenarios.regions import parts
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, Shape
-from sim.bullet import resolved_urdf
+from sim.bullet_bodies import resolved_urdf
 from sim.bullet_shapes import add_visual_shape
 from sim.render_camera import Camera, Window, distances
 from sim.render_egl import load_egl

@@ -11,7 +11,8 @@ from pinocchio import SE3
 from planner.grasps import grasps
 from scenarios.load import load_scenario
 from scenarios.shapes import Box, Cylinder, Sphere
-from sim.bullet import BulletPlant, resolved_urdf
+from sim.bullet import BulletPlant
+from sim.bullet_bodies import resolved_urdf
 from sim.plant import Command, GripCommand
 from sim.robot import GRAVITY, RobotModel
 
