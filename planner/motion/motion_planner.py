@@ -128,10 +128,11 @@ class MotionPlanner:
     ) -> MotionFailure | None:
         """None if the joint path (n,7) is free by the exact model, else what it hits.
 
-        Culprits are the movable bodies it hits, if it hits nothing else.
+        What touches at its start may stay as near, see `move`. Culprits are the movable bodies it hits, if it hits
+        nothing else.
         """
         margins = Margins(self.settings.line_margin if margin is None else margin, allowed)
-        contacts = self._contacts(scene, path, margins)
+        contacts = self._contacts(scene, path, self._leaving(scene, path[0], margins))
         return blame("the line comes too near:", contacts, movables(scene)) if contacts else None
 
     def timed_line(
@@ -150,7 +151,8 @@ class MotionPlanner:
         q = trajectory.q
         if checked is not None and checked < len(path):
             q = q[: int(np.argmin(np.abs(q - path[checked - 1]).max(axis=1))) + 1]
-        return self._audit(scene, q, Margins(self.settings.audit_margin, allowed)) or trajectory
+        margins = self._leaving(scene, path[0], Margins(self.settings.audit_margin, allowed))
+        return self._audit(scene, q, margins) or trajectory
 
     def audit(
         self,
@@ -297,6 +299,11 @@ class MotionPlanner:
         """Everything that is nearer than its margin at q (7,)."""
         self.work.add("exact_checks")
         return self._exact(scene, margins).contacts(q[None])
+
+    def _leaving(self, scene: SceneState, start: np.ndarray, margins: Margins) -> Margins:
+        """The margins of a motion that begins at `start` (7,): what is near there, but not deep in, may stay as near."""
+        near = self._near(scene, start, margins)
+        return _relaxed(margins, [contact for contact in near if contact.distance >= DEEPEST])
 
     def _contacts(self, scene: SceneState, path: np.ndarray, margins: Margins) -> list[Contact]:
         """What the path (n,7) hits, up to the first thing that can't be moved aside."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bench import Bench, action, scene_with, with_pose
+from pinocchio import SE3
 from py_trees.common import Status
 
 from planner.failure import RefinementFailure
@@ -37,6 +38,16 @@ def test_the_sponge_is_picked_by_its_ends_and_hangs_level():
     closing_W = bench.robot.X_WG(bench.scene.q).rotation[:, 1]
     assert abs(closing_W @ X_WO.rotation[:, 0]) > 0.99
     assert X_WO.rotation[2, 2] > np.cos(np.radians(3))
+
+
+def test_what_touches_a_neighbour_is_lifted_off_beside_it():
+    scene = with_pose(scene_with("sponge", "carrot"), "carrot", 0.6, 0.1425)
+    sponge = replace(scene.bodies["sponge"], X_WO=SE3(np.eye(3), np.array([0.6, 0.1, 0.07])))
+    bench = Bench(replace(scene, bodies={**scene.bodies, "sponge": sponge}))
+    bench.run(100)
+    crumb = bench.scene.poses["carrot"].translation.copy()
+    assert bench.do("pick(sponge, table)") is Status.SUCCESS
+    assert np.linalg.norm(bench.scene.poses["carrot"].translation - crumb) < 0.01
 
 
 def test_a_flat_book_has_no_grasp_as_it_lies_and_nothing_movable_is_to_blame():
