@@ -301,7 +301,7 @@ class MotionPlanner:
         return self._exact(scene, margins).contacts(q[None])
 
     def _leaving(self, scene: SceneState, start: np.ndarray, margins: Margins) -> Margins:
-        """The margins of a motion that begins at `start` (7,): what is near there, but not deep in, may stay as near."""
+        """Margins of a motion that begins at `start` (7,): what is near there, but not deep in, may stay as near."""
         near = self._near(scene, start, margins)
         return _relaxed(margins, [contact for contact in near if contact.distance >= DEEPEST])
 
