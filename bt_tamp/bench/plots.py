@@ -109,7 +109,8 @@ def plot_planners(folder: Path, results: Sequence[SceneResult]) -> list[Path]:
         axes.plot(row.median_ms, row.short, "v", color=line.get_color())
     axes.set_xscale("log")
     axes.set_xlabel("CPU time of a query, ms (median)")
-    axes.set_ylabel("length by the shortest path known (● as found, ▼ shortened)")
+    axes.set_ylabel("length by the shortest known")
+    axes.set_title("● as found, ▼ shortened", fontsize="medium")
     axes.legend()
     return [_saved(figure, folder / "motion.png")]
 
