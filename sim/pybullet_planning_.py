@@ -5,6 +5,7 @@ Its planner (`birrt` with its defaults) asks PyBullet about one pair of links af
 
 import random
 from collections.abc import Iterable, Iterator
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -28,13 +29,12 @@ class PybulletPlanning(BulletPlant):
     """
 
     def __init__(self, scene: SceneState, robot: RobotModel, watched: Iterable[Watched], resolution: float) -> None:
-        import pybullet_planning
-
+        package = import_module("pybullet_planning")
         super().__init__(scene.scenario, robot)
         if self._client != 0:
             self.close()
             raise RuntimeError("pybullet-planning needs the process' only engine, and another one is running")
-        self._package: Any = pybullet_planning
+        self._package: Any = package
         self._place(scene)
         self._held = None if scene.held is None else self._attached(scene.held.name, scene.held.X_GO)
         self._pairs = [pair for first, second, margin in watched for pair in self._numbers(first, second, margin)]
