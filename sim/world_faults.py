@@ -3,6 +3,7 @@
 Each happens once, before the first step at or after its start; what lasts ends with the fault.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 from pinocchio import SE3
@@ -12,11 +13,12 @@ from sim.disturbance import Fault
 
 
 @dataclass(frozen=True)
-class _Deed(Fault):
+class _Deed(Fault, ABC):
     """Done once; nothing is left to end."""
 
+    @abstractmethod
     def begin(self, plant: BulletPlant) -> None:
-        raise NotImplementedError
+        """Do it."""
 
     def act(self, plant: BulletPlant) -> None:
         """Nothing more: the deed is done."""
