@@ -29,7 +29,7 @@ from planner.failure import MotionFailure
 from planner.motion.collision import FastChecker
 from planner.motion.exact import ExactChecker
 from planner.motion.motion_planner import MotionPlanner
-from planner.motion.ompl_ import path_length
+from planner.motion.ompl_ import PathSettings, path_length, plan_path
 
 
 @pytest.fixture(scope="module")
@@ -121,8 +121,18 @@ def test_a_move_is_planned_timed_and_audited(arena):
 
 
 def test_longer_searching_finds_no_longer_path(arena):
-    best = best_length(arena, 0.3)
-    assert np.linalg.norm(arena.query.goal - arena.scene.q) - 1e-9 <= best <= search(arena, "RRTConnect", 0).length
+    settings = PathSettings("AORRTC", restarts=1)
+    paths = [plan_path(arena.question(0, checks), arena.checker(), settings) for checks in (2_000, 8_000, 32_000)]
+    lengths = [path_length(path) for path in paths if path is not None]
+    assert len(lengths) == 3
+    assert lengths == sorted(lengths, reverse=True)
+    assert lengths[-1] >= np.linalg.norm(arena.query.goal - arena.scene.q) - 1e-9
+
+
+def test_where_the_straight_edge_is_free_nothing_is_shorter(query):
+    near = Arena(replace(query, goal=query.scene.q + 0.01))
+    assert near.is_straight()
+    assert best_length(near, 0.0) == pytest.approx(0.01 * np.sqrt(7))
 
 
 def test_a_lowered_goal_collides_and_a_walled_one_is_free_but_out_of_reach(arena):
