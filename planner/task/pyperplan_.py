@@ -11,6 +11,7 @@ from functools import cache, partial
 from types import SimpleNamespace
 from typing import Any
 
+from planner.task.merging import merged
 from planner.task.pddl import Domain, Problem
 from planner.task.pddl_reader import read_domain, read_problem
 from planner.task.primitives import ground
@@ -25,15 +26,8 @@ SMALL_EXPANSIONS = 300
 WEIGHT = 5.0
 """Weight of the heuristic in weighted A*."""
 
-FINER = (1.5, 1.2)
-"""Weights with which `auto` looks for a shorter plan once it has one. Each search begins anew, but what the heuristic
-said of a state is kept (Richter, Thayer, Ruml: The Joy of Forgetting, 2010)."""
-
-FINER_EXPANSIONS = 250
-"""Nodes that this may take for one plan."""
-
 SEARCHES = ("auto", "astar-hmax", "wastar-hff", "gbfs-hff", "astar-blind")
-"""auto: A* with h^max (optimal) while that is quick, then weighted A* with h^FF, first coarse, then finer."""
+"""auto: A* with h^max (optimal) while that is quick, then weighted A* with h^FF, whose plan is merged."""
 
 
 class PyperplanPlanner:
@@ -55,7 +49,8 @@ class PyperplanPlanner:
         search = _Search(library, _numbered(library, domain_text, problem_text), max_expansions)
         names = self._auto(search) if self._search == "auto" else search.run(self._search)
         if names is not None:
-            return _checked(domain, problem, names, search.expansions)
+            plan = _checked(domain, problem, names, search.expansions)
+            return merged(plan, problem.init) if self._search == "auto" else plan
         return NoTaskPlan(search.is_exhausted, search.expansions)
 
     def _auto(self, search: "_Search") -> list[str] | None:
@@ -63,14 +58,7 @@ class PyperplanPlanner:
             names = search.run("astar-hmax", SMALL_EXPANSIONS)
             if names is not None or search.is_exhausted:
                 return names
-        best = search.run("wastar-hff")
-        if best is None:
-            return None
-        last = search.expansions + FINER_EXPANSIONS
-        for weight in FINER:
-            names = search.run("wastar-hff", last - search.expansions, weight)
-            best = names if names and len(names) < len(best) else best
-        return best
+        return search.run("wastar-hff")
 
 
 class _OutOfExpansions(Exception):
@@ -142,7 +130,7 @@ class _Search:
         self._limit = limit
         self._heuristics: dict[str, _Remembering] = {}
 
-    def run(self, name: str, limit: int | None = None, weight: float = WEIGHT) -> list[str] | None:
+    def run(self, name: str, limit: int | None = None) -> list[str] | None:
         """Names of a plan's operators, or None: the space was searched whole or so many nodes expanded."""
         last = self._limit if limit is None else min(self._limit, self.expansions + limit)
         successors = self._library.task.Task.get_successor_states
@@ -156,17 +144,17 @@ class _Search:
         self._task.get_successor_states = counted
         strategy, _, heuristic = name.partition("-")
         try:
-            solution = self._strategy(strategy, weight)(self._task, self._heuristic(heuristic))
+            solution = self._strategy(strategy)(self._task, self._heuristic(heuristic))
         except _OutOfExpansions:
             return None
         self.is_exhausted = solution is None
         return None if solution is None else [operator.name for operator in solution]
 
-    def _strategy(self, name: str, weight: float) -> Callable[..., Any]:
+    def _strategy(self, name: str) -> Callable[..., Any]:
         a_star = self._library.a_star
         strategies = {
             "astar": a_star.astar_search,
-            "wastar": partial(a_star.weighted_astar_search, weight=weight),
+            "wastar": partial(a_star.weighted_astar_search, weight=WEIGHT),
             "gbfs": a_star.greedy_best_first_search,
         }
         return strategies[name]
