@@ -14,8 +14,12 @@ from planner.task.symbols import GroundAction
 from sim.scene import SceneState
 
 
+MAX_WORKED = 4
+"""Samples of an action that are kept because they worked, the latest first."""
+
+
 class ActionRefiner:
-    """Refines single actions and remembers, until `forget`, what worked where."""
+    """Refines single actions and remembers what worked where."""
 
     def __init__(self, refiners: Refiners, learned: Learned) -> None:
         self._refiners = refiners
@@ -23,11 +27,9 @@ class ActionRefiner:
         self._refined: dict[tuple[GroundAction, bytes], Refinement] = {}
         self._worked: dict[tuple[GroundAction, Spot], tuple[Any, ...]] = {}
 
-    def forget(self) -> None:
-        """Start afresh, for another observed scene: what was carried out meanwhile (how hard something had to be
-        pressed) has taught more than what was planned, and `Learned` keeps that."""
+    def begin(self) -> None:
+        """Another plan is sought, from another observed scene. What worked is tried first again."""
         self._refined.clear()
-        self._worked.clear()
 
     def refine(
         self,
@@ -51,7 +53,9 @@ class ActionRefiner:
         place = (action, situation.spot(action.args[0]))
         learned, is_fresh = self._learned.hints(action, situation)
         avoided = learned.avoid.union(avoid)
-        wanted = dict.fromkeys((*first, *self._worked.get(place, ()), *learned.first))
+        # What failed when it was carried out (pressed too lightly, say) had worked when it was planned.
+        worked = () if learned.failed else self._worked.get(place, ())
+        wanted = dict.fromkeys((*first, *worked, *learned.first))
         hints = replace(learned, first=tuple(sample for sample in wanted if sample not in avoided), avoid=avoided)
         tries = len(hints.first) + (budget.tries if is_fresh else 0)
         work.add("refinements")
@@ -59,7 +63,7 @@ class ActionRefiner:
         if isinstance(outcome, Refinement):
             self._refined[key] = outcome
             earlier = (sample for sample in self._worked.get(place, ()) if sample != outcome.sample)
-            self._worked[place] = (outcome.sample, *earlier)
+            self._worked[place] = (outcome.sample, *earlier)[:MAX_WORKED]
         return outcome, hints.first
 
     def _outcome(

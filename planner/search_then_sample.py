@@ -116,7 +116,7 @@ class SearchThenSample:
         """A plan from the scene as observed, refined whole, or why there is none."""
         self._stated = None
         self.learned.begin(scene)
-        self._actions.forget()
+        self._actions.begin()
         try:
             outcome = self._rounds(scene, goal, rng, work)
         finally:

@@ -497,6 +497,16 @@ def test_an_action_is_refined_again_with_the_samples_of_the_plan_first(tabletop,
     assert skill.calls[0][1] == [3]
 
 
+def test_when_planned_again_what_worked_is_tried_first(tabletop, stand_in):
+    skill = stand_in(rule(pick_cup=lambda sample, scene: None if sample >= 3 else set()))
+    run = Run(skill)
+    scene = tabletop("cup mug")
+    run.plan(scene, CUP_AWAY)
+    skill.calls.clear()
+    run.plan(shifted(scene, "mug", 0.1), CUP_AWAY)
+    assert skill.calls[0][:2] == ("pick(cup, table)", [3])
+
+
 def test_a_sample_that_failed_in_execution_is_avoided_and_after_three_the_action_counts_as_failed(tabletop, stand_in):
     skill = stand_in(rule())
     run = Run(skill)
