@@ -226,7 +226,39 @@ def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | No
         probes = np.concatenate([probes, ends])
     limits = np.stack([robot.q_min, robot.q_max])
     probes = np.append(probes, np.zeros((len(probes), 1)), axis=1)
-    return ArmArrays(*chain(robot), limits, *_spheres(robot), solids, corners, probes)
+    return ArmArrays(*chain(robot), limits, *_spheres(robot), solids, corners, probes, _turning(robot, solids))
+
+
+def _turning(robot: RobotModel, solids: np.ndarray) -> np.ndarray:
+    """See `ArmArrays`. The origin of the next joint keeps its distance from an axis, and all beyond it its distance
+    from that origin at most."""
+    steps = chain(robot).joints[1:, 9:]
+    turning = np.zeros((7, 9))
+    turning[:, :8] = _link_turning(robot)
+    reach = np.linalg.norm(solids[:, PLACE + 9 : FIRST], axis=1) + np.linalg.norm(solids[:, HALF:PLACE], axis=1)
+    turning[:, 8] = _beyond(steps, float(reach.max()))
+    return turning
+
+
+@lru_cache(maxsize=16)
+def _link_turning(robot: RobotModel) -> np.ndarray:
+    """The columns of links 0 to 7."""
+    steps, (table, first, _) = chain(robot).joints[1:, 9:], _spheres(robot)
+    turning = np.zeros((7, ARM_LINKS))
+    for link in range(1, ARM_LINKS):
+        own = table[first[link] : first[link + 1]]
+        turning[:link, link] = _beyond(steps[: link - 1], float(np.max(np.linalg.norm(own[:, :3], axis=1) + own[:, 3])))
+    return turning
+
+
+def _beyond(steps: np.ndarray, reach: float) -> np.ndarray:
+    """How far what lies within `reach` of the last origin can be from each axis (z): (n+1,). steps (n,3) lead from each
+    origin to the next."""
+    found = [reach]
+    for step in steps[::-1]:
+        found.append(float(np.hypot(step[0], step[1])) + reach)
+        reach += float(np.linalg.norm(step))
+    return np.array(found[::-1])
 
 
 @lru_cache(maxsize=64)
@@ -287,7 +319,8 @@ def _scene_arrays(arm: ArmArrays, parts: tuple[str, ...], scene: SceneState, mar
     within = margins.within_robot(own.pairs)
     pairs = [np.column_stack([rows[:, 1:], within[rows[:, 0].astype(int)]]) for rows in (own.links, own.solids)]
     watched = [rows[rows[:, 2] > -np.inf] for rows in pairs]
-    return SceneArrays(table, corners, margins.table(parts, names), *watched)
+    bounds = table[:, LOWER:OBSTACLE_COLUMNS].T
+    return SceneArrays(table, corners, margins.table(parts, names), *watched, bounds)
 
 
 def clear_of(
