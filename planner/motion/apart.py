@@ -15,7 +15,6 @@ from numba import njit
 from planner.motion.gjk import surely_apart
 from planner.motion.tables import CYLINDER, HALF, HULL, KIND, LOWER, OBSTACLE_COLUMNS, PLACE, SPHERE, UPPER
 
-
 _part = njit(inline="always")
 """Written into its callers."""
 

@@ -169,7 +169,7 @@ def _link_room(covers, spheres, first, link, scene, gaps, room):
     )
     obstacles = scene.obstacles
     for k in range(gaps.shape[0]):
-        if gaps[k] > room or gaps[k] > 0.0 and room == 0.0:
+        if gaps[k] > room or (gaps[k] > 0.0 and room == 0.0):
             continue
         margin = scene.margins[link, k]
         for s in range(int(first[link]), int(first[link + 1])):
@@ -207,7 +207,7 @@ def _links_part(covers, spheres, first, pairs, relative, part):
                 dx, dy = spheres[s, 0] - spheres[t, 0], spheres[s, 1] - spheres[t, 1]
                 dz = spheres[s, 2] - spheres[t, 2]
                 gap = np.sqrt(dx * dx + dy * dy + dz * dz) - spheres[s, 3] - spheres[t, 3] - margin
-                part = max(0.0, gap / rate)
+                part = max(0.0, gap) / (rate + 1e-12)
     return part
 
 
@@ -235,7 +235,7 @@ def _hand_part(solids, own, covers, spheres, first, pairs, relative, part):
             if gap < 0.0 and point_near(x, y, z, reach, solids, s, own):
                 return -1.0
             if gap < rate * part:
-                part = max(0.0, gap / rate)
+                part = max(0.0, gap) / (rate + 1e-12)
     return part
 
 
@@ -354,7 +354,12 @@ def unpack(packed):
         _table(packed, 9),
     )
     scene = SceneArrays(
-        _table(packed, 10), _table(packed, 11), _table(packed, 12), _table(packed, 13), _table(packed, 14), _table(packed, 15)
+        _table(packed, 10),
+        _table(packed, 11),
+        _table(packed, 12),
+        _table(packed, 13),
+        _table(packed, 14),
+        _table(packed, 15),
     )
     return arm, scene
 
@@ -376,7 +381,5 @@ def edge_is_free(qa, qb, packed, joint_step, travel_step):
     spheres, covers = np.empty((arm.spheres.shape[0], 4)), np.empty((8, 4))
     solids, places = np.empty((arm.solids.shape[0], OBSTACLE_COLUMNS)), np.empty((3, arm.probes.shape[0], 3))
     done = np.zeros(1 + _edge_steps(qa, qb, arm, links, q, places, joint_step, travel_step), dtype=np.bool_)
-    checks = _blocked(
-        qa, qb, arm, scene, done, links, q, spheres, covers, solids, twists, gaps, way, bends, relative
-    )
+    checks = _blocked(qa, qb, arm, scene, done, links, q, spheres, covers, solids, twists, gaps, way, bends, relative)
     return checks > 0, abs(checks)

@@ -45,7 +45,7 @@ class MotionSettings:
     planner: str = "RRTConnect"
     goal_bias: float = 0.05
     restarts: int = 3
-    step: float = 0.8
+    step: float = 1.2
     margin: float = FREE_MARGIN
     line_margin: float = 0.002
     audit_margin: float = 0.001

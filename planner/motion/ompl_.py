@@ -42,7 +42,7 @@ class PathSettings:
     planner: str = "RRTConnect"
     goal_bias: float = 0.05
     restarts: int = 3
-    step: float = 0.8
+    step: float = 1.2
 
     def __post_init__(self) -> None:
         if self.planner not in _PLANNERS:

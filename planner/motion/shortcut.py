@@ -7,7 +7,7 @@ from planner.motion.checking import CollisionChecker
 from planner.motion.collision import JOINT_STEP, TRAVEL_STEP, FastChecker
 from planner.motion.kernels import edge_is_free
 
-TRIES = 40
+TRIES = 24
 
 WORTH = 0.01
 """Part of the path's length that a shortcut must save for its edge to be looked at."""

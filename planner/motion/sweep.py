@@ -9,9 +9,6 @@ it moves by at most δ Σ_{k>i} |Δq_k| r_k.
 import numpy as np
 from numba import njit
 
-from planner.motion.tables import RIDERS
-
-
 _part = njit(inline="always")
 """Written into its callers."""
 

@@ -1,5 +1,6 @@
 """The flat tables in which the compiled collision tests take solids: what stands in which column."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -62,9 +63,25 @@ class SceneArrays(NamedTuple):
     bounds: np.ndarray
 
 
-def pack(arm: ArmArrays, scene: SceneArrays) -> np.ndarray:
+class Packed(NamedTuple):
+    """Tables one after the other: their shapes, and all their numbers."""
+
+    shapes: list[tuple[int, int]]
+    numbers: np.ndarray
+
+
+def flat(tables: Iterable[np.ndarray]) -> Packed:
+    """Tables (one row for what has one dimension) one after the other."""
+    tables = [np.atleast_2d(table) for table in tables]
+    return Packed([(len(table), table.shape[1]) for table in tables], np.concatenate([t.ravel() for t in tables]))
+
+
+def pack(arm: Packed, scene: SceneArrays) -> np.ndarray:
     """All tables in one array: first for each where it begins, its rows and its columns, then their numbers."""
-    tables = [np.atleast_2d(table) for table in (*arm, *scene)]
-    starts = np.cumsum([3 * len(tables), *(table.size for table in tables[:-1])])
-    header = [(start, *table.shape) for start, table in zip(starts, tables, strict=True)]
-    return np.concatenate([np.ravel(header), *(np.ravel(table) for table in tables)]).astype(float)
+    world = flat(scene)
+    shapes = [*arm.shapes, *world.shapes]
+    header, start = [], 3.0 * len(shapes)
+    for rows, columns in shapes:
+        header += [start, rows, columns]
+        start += rows * columns
+    return np.concatenate([header, arm.numbers, world.numbers])
