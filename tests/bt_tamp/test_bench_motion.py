@@ -86,7 +86,7 @@ def test_the_full_run_has_thirty_tables_and_twenty_seeds_and_the_quick_one_fewer
     full, quick = planned(False), planned(True)
     assert sum(job.table is not None for job in full) == 30
     assert {job.seeds for job in full} == {20}
-    assert full[0] == Job(None, 20, 2, 0.0)
+    assert full[0] == Job(None, 20, 2, 30.0)
     assert len(quick) < len(full)
     assert max(job.seeds for job in quick) < 20
 
