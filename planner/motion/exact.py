@@ -126,7 +126,10 @@ def _none(pair: Pair) -> bool:
 
 
 class ExactChecker:
-    """Convex solids in coal: for culprits, for lines near contact, for the audit of timed paths."""
+    """Convex solids in coal: for culprits, for lines near contact, for the audit of timed paths.
+
+    parts: names of what moves, the robot's links and the held body.
+    """
 
     def __init__(self, robot: RobotModel, scene: SceneState, margins: Margins | None = None) -> None:
         margins = Margins() if margins is None else margins
@@ -135,6 +138,7 @@ class ExactChecker:
         self._fixed = _fixed(Standing(scene))
         self._moving = _moving(robot, scene)
         parts = part_names(robot, scene.held)
+        self.parts = frozenset(parts)
         self._solids = [*self._moving.solids, *self._fixed.solids]
         self._outward = _outward_pairs(parts, self._moving.part, self._moving.link, self._fixed.names, margins)
         self._inward = _inward_pairs(parts, self._moving.names, margins)
