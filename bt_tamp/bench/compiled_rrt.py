@@ -1,4 +1,4 @@
-"""The limit for `bench motion`: a bidirectional RRT with shortcuts, all of it compiled, over the planner's own kernels.
+"""The limit for `bench motion`: a bidirectional RRT, compiled like the planner's own kernels and shortcuts.
 
 Bidirectional RRT as in Kuffner, LaValle: RRT-Connect, an efficient approach to single-query path planning, 2000.
 """
@@ -11,9 +11,9 @@ from numba import njit
 from planner.motion.collision import JOINT_STEP, TRAVEL_STEP, FastChecker
 from planner.motion.kernels import edge_is_free
 from planner.motion.ompl_ import Query
+from planner.motion.shortcut import TRIES, shorten
 
 NODES = 4000
-SHORTCUTS = 40
 
 _part = njit(inline="always")
 """Compiled into `_plan` only: every function of its own would have the kernels compiled into it anew."""
@@ -31,16 +31,16 @@ def plan_compiled(checker: FastChecker, query: Query, step: float) -> CompiledPa
     """A path from the start to the first goal, edges of the trees at most `step` rad long; None within NODES nodes."""
     ends = np.array(query.start), np.array(query.goals[0])
     rng = np.random.default_rng(query.seed)
-    path, count, short, kept = _plan(*ends, checker.packed, np.array(query.limits), step, rng)
-    return CompiledPath(path[:count], short[:kept]) if count else None
+    path = _plan(*ends, checker.packed, np.array(query.limits), step, rng)
+    if not len(path):
+        return None
+    return CompiledPath(path, shorten(path, rng.uniform(size=(TRIES, 2)), checker.packed)[0])
 
 
 @njit(cache=True)
 def _plan(start, goal, packed, limits, step, rng):
     found = np.empty((2 * NODES, 7))
-    count = _search(start, goal, packed, limits, step, rng, found)
-    short = found.copy()
-    return found, count, short, _shorten(short, count, packed, rng)
+    return found[: _search(start, goal, packed, limits, step, rng, found)].copy()
 
 
 @_part
@@ -110,44 +110,3 @@ def _joined(trees, parents, sizes, found):
         found[count] = trees[1, node]
         count += 1
     return count
-
-
-@_part
-def _shorten(path, count, packed, rng):
-    """Shorten the path's first `count` waypoints in place, as `planner.motion.shortcut` does; how many are left."""
-    count = _without_detours(path, count, packed)
-    for _ in range(SHORTCUTS if count > 2 else 0):
-        way = np.zeros(count)
-        for i in range(1, count):
-            way[i] = way[i - 1] + np.sqrt(((path[i] - path[i - 1]) ** 2).sum())
-        first, second = rng.uniform(0.0, way[-1]), rng.uniform(0.0, way[-1])
-        first, second = min(first, second), max(first, second)
-        i, j = 0, 0
-        while i < count - 2 and way[i + 1] <= first:
-            i += 1
-        while j < count - 2 and way[j + 1] <= second:
-            j += 1
-        if i == j:
-            continue
-        qa = path[i] + (path[i + 1] - path[i]) * ((first - way[i]) / (way[i + 1] - way[i]))
-        qb = path[j] + (path[j + 1] - path[j]) * ((second - way[j]) / (way[j + 1] - way[j]))
-        if edge_is_free(qa, qb, packed, JOINT_STEP, TRAVEL_STEP)[0]:
-            tail = path[j + 1 : count].copy()
-            path[i + 1], path[i + 2] = qa, qb
-            path[i + 3 : i + 3 + len(tail)] = tail
-            count = i + 3 + len(tail)
-    return _without_detours(path, count, packed)
-
-
-@_part
-def _without_detours(path, count, packed):
-    kept, i = 1, 0
-    while i < count - 1:
-        j = count - 1
-        while j > i + 1 and not edge_is_free(path[i], path[j], packed, JOINT_STEP, TRAVEL_STEP)[0]:
-            j -= 1
-        # kept ≤ j: nothing still needed is written over.
-        path[kept] = path[j]
-        kept += 1
-        i = j
-    return kept

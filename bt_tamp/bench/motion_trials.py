@@ -19,8 +19,8 @@ from planner.motion.world import Margins, obstacles
 from sim.robot import RobotModel
 from sim.scene import SceneState
 
-MAX_CHECKS = 10_000
-"""Configurations that a search may look at; planners that better their path use them all."""
+MAX_CHECKS = 4000
+"""Configurations that a search may look at, as many as a skill's; planners that better their path use them all."""
 
 STEP = MotionSettings().step
 

@@ -15,8 +15,11 @@ from numba import njit
 from planner.motion.gjk import surely_apart
 from planner.motion.tables import CYLINDER, HALF, HULL, KIND, LOWER, OBSTACLE_COLUMNS, PLACE, SPHERE, UPPER
 
+_part = njit(inline="always")
+"""Written into its callers."""
 
-@njit(cache=True)
+
+@_part
 def out_of_bounds(x, y, z, reach, obstacles, k):
     """Is the cube of half side `reach` about the point clear of the obstacle's world bounds?"""
     return (
@@ -29,7 +32,7 @@ def out_of_bounds(x, y, z, reach, obstacles, k):
     )
 
 
-@njit(cache=True)
+@_part
 def bounds_apart(solids, s, obstacles, k, margin):
     """Are the world bounds of placed solid s and of obstacle k further apart than the margin?"""
     for i in range(3):
@@ -40,7 +43,7 @@ def bounds_apart(solids, s, obstacles, k, margin):
     return False
 
 
-@njit(cache=True)
+@_part
 def _distance(dx, dy, dz, solids, k):
     """Distance from solid k (a hull counts as its bounding box) of a point d away from its centre; 0 inside."""
     R = PLACE
@@ -55,6 +58,13 @@ def _distance(dx, dy, dz, solids, k):
     else:
         x, y = max(0.0, abs(x) - solids[k, HALF]), max(0.0, abs(y) - solids[k, HALF + 1])
     return np.sqrt(x * x + y * y + z * z)
+
+
+@_part
+def point_distance(x, y, z, solids, k):
+    """Distance of the point from placed solid k, 0 inside; for a hull, from its bounding box."""
+    p = PLACE + 9
+    return _distance(x - solids[k, p], y - solids[k, p + 1], z - solids[k, p + 2], solids, k)
 
 
 @njit(cache=True)

@@ -27,7 +27,9 @@ from planner.motion.tables import (
     SPHERE,
     UPPER,
     ArmArrays,
+    Packed,
     SceneArrays,
+    flat,
     pack,
 )
 from planner.motion.world import Margins, Same, Standing
@@ -72,8 +74,8 @@ class FastChecker:
         margins = Margins() if margins is None else margins
         parts = part_names(robot, scene.held)
         self.checks = 0
-        arm = _arm_arrays(robot, scene.opening, _held(scene))
-        self.packed = pack(arm, _scene_arrays(arm, parts, scene, margins))
+        arm = _arm(robot, scene)
+        self.packed = pack(arm.packed, _scene_tables(arm, parts, scene, margins))
 
     def is_free(self, q: np.ndarray) -> bool:
         """Is q (7,) within the joint limits and free of collision?"""
@@ -91,16 +93,12 @@ class FastChecker:
 
 def hand_hits(robot: RobotModel, scene: SceneState, X_WG: SE3, margins: Margins) -> frozenset[str]:
     """Names of what hand, fingers or held body would come too near to with the gripper at X_WG, wherever the arm is."""
-    arm = _arm_arrays(robot, scene.opening, _held(scene))
+    arm = _arm(robot, scene).tables
     names, table, corners = _obstacle_rows(Standing(scene))
     X_W7 = X_WG * robot.model.frames[robot.tcp_id].placement.inverse()
     allowed = margins.table(part_names(robot, scene.held), names)
     hits = hand_contacts(placement(X_W7)[None], arm.solids, arm.corners, table, corners, allowed)
     return frozenset(name for name, hit in zip(names, hits, strict=True) if hit)
-
-
-def _held(scene: SceneState) -> tuple[Held, Shape] | None:
-    return None if scene.held is None else (scene.held, scene.scenario.bodies[scene.held.name].shape)
 
 
 def part_names(robot: RobotModel, held: Held | None) -> tuple[str, ...]:
@@ -211,6 +209,28 @@ def _hand_rows(robot: RobotModel, opening: float) -> np.ndarray:
     )
 
 
+class _Arm(NamedTuple):
+    """The robot's tables, the same packed, and which of its own parts can meet."""
+
+    tables: ArmArrays
+    packed: Packed
+    own: "_OwnPairs"
+
+
+def _arm(robot: RobotModel, scene: SceneState) -> _Arm:
+    held = scene.held
+    shape = None if held is None else scene.scenario.bodies[held.name].shape
+    return _arm_of(robot, scene.opening, Same(held, shape))
+
+
+@lru_cache(maxsize=64)
+def _arm_of(robot: RobotModel, opening: float, carried: Same) -> _Arm:
+    held, shape = carried.things
+    tables = _arm_arrays(robot, opening, None if held is None else (held, shape))
+    own = _own_pairs(part_names(robot, held), tuple(tables.solids[:, PART].tolist()))
+    return _Arm(tables, flat(tables), own)
+
+
 def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | None) -> ArmArrays:
     X_7G = robot.model.frames[robot.tcp_id].placement
     solids, corners = _hand_rows(robot, opening), _NO_CORNERS
@@ -226,7 +246,39 @@ def _arm_arrays(robot: RobotModel, opening: float, held: tuple[Held, Shape] | No
         probes = np.concatenate([probes, ends])
     limits = np.stack([robot.q_min, robot.q_max])
     probes = np.append(probes, np.zeros((len(probes), 1)), axis=1)
-    return ArmArrays(*chain(robot), limits, *_spheres(robot), solids, corners, probes)
+    return ArmArrays(*chain(robot), limits, *_spheres(robot), solids, corners, probes, _turning(robot, solids))
+
+
+def _turning(robot: RobotModel, solids: np.ndarray) -> np.ndarray:
+    """See `ArmArrays`. The origin of the next joint keeps its distance from an axis, and all beyond it its distance
+    from that origin at most."""
+    steps = chain(robot).joints[1:, 9:]
+    turning = np.zeros((7, 9))
+    turning[:, :8] = _link_turning(robot)
+    reach = np.linalg.norm(solids[:, PLACE + 9 : FIRST], axis=1) + np.linalg.norm(solids[:, HALF:PLACE], axis=1)
+    turning[:, 8] = _beyond(steps, float(reach.max()))
+    return turning
+
+
+@lru_cache(maxsize=16)
+def _link_turning(robot: RobotModel) -> np.ndarray:
+    """The columns of links 0 to 7."""
+    steps, (table, first, _) = chain(robot).joints[1:, 9:], _spheres(robot)
+    turning = np.zeros((7, ARM_LINKS))
+    for link in range(1, ARM_LINKS):
+        own = table[first[link] : first[link + 1]]
+        turning[:link, link] = _beyond(steps[: link - 1], float(np.max(np.linalg.norm(own[:, :3], axis=1) + own[:, 3])))
+    return turning
+
+
+def _beyond(steps: np.ndarray, reach: float) -> np.ndarray:
+    """How far what lies within `reach` of the last origin can be from each axis (z): (n+1,). steps (n,3) lead from each
+    origin to the next."""
+    found = [reach]
+    for step in steps[::-1]:
+        found.append(float(np.hypot(step[0], step[1])) + reach)
+        reach += float(np.linalg.norm(step))
+    return np.array(found[::-1])
 
 
 @lru_cache(maxsize=64)
@@ -259,11 +311,13 @@ def placed_rows(solids: Sequence[tuple[Convex, SE3]]) -> tuple[np.ndarray, np.nd
 
 
 class _OwnPairs(NamedTuple):
-    """Pairs of the robot's parts. Rows (k,3), (l,3) of two links, of a solid and a link: their pair's number, both."""
+    """Pairs of the robot's parts. Rows (k,3), (l,3) of two links, of a solid and a link: their pair's number, both.
+    free: both tables as they are with no margin."""
 
     pairs: list[Pair]
     links: np.ndarray
     solids: np.ndarray
+    free: tuple[np.ndarray, np.ndarray]
 
 
 @lru_cache(maxsize=64)
@@ -277,17 +331,26 @@ def _own_pairs(parts: tuple[str, ...], riders: tuple[float, ...]) -> _OwnPairs:
             links.append((n, a, b))
         else:
             solids += [(n, s, b) for s, part in enumerate(riders) if part == a]
-    rows = (np.array(table, dtype=float).reshape(-1, 3) for table in (links, solids))
-    return _OwnPairs([frozenset(pair) for pair in pairs], *rows)
+    first, second = (np.array(table, dtype=float).reshape(-1, 3) for table in (links, solids))
+    free = _watched(first, np.zeros(len(first))), _watched(second, np.zeros(len(second)))
+    return _OwnPairs([frozenset(pair) for pair in pairs], first, second, free)
 
 
-def _scene_arrays(arm: ArmArrays, parts: tuple[str, ...], scene: SceneState, margins: Margins) -> SceneArrays:
+def _scene_tables(arm: _Arm, parts: tuple[str, ...], scene: SceneState, margins: Margins) -> SceneArrays:
     names, table, corners = _obstacle_rows(Standing(scene))
-    own = _own_pairs(parts, tuple(arm.solids[:, PART].tolist()))
-    within = margins.within_robot(own.pairs)
-    pairs = [np.column_stack([rows[:, 1:], within[rows[:, 0].astype(int)]]) for rows in (own.links, own.solids)]
-    watched = [rows[rows[:, 2] > -np.inf] for rows in pairs]
-    return SceneArrays(table, corners, margins.table(parts, names), *watched)
+    bounds = table[:, LOWER:OBSTACLE_COLUMNS].T
+    links, solids = arm.own.links, arm.own.solids
+    if margins.allowed or margins.relaxed:
+        within = margins.within_robot(arm.own.pairs)
+        links, solids = (_watched(rows, within[rows[:, 0].astype(int)]) for rows in (links, solids))
+    else:
+        links, solids = arm.own.free
+    return SceneArrays(table, corners, margins.table(parts, names), links, solids, bounds)
+
+
+def _watched(rows: np.ndarray, margins: np.ndarray) -> np.ndarray:
+    """Rows (k,3) of two parts and their margin, those left out that may do anything."""
+    return np.column_stack([rows[:, 1:], margins])[margins > -np.inf]
 
 
 def clear_of(

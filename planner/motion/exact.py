@@ -18,10 +18,10 @@ from planner.motion.chain import place_links
 from planner.motion.collision import ARM_LINKS, part_names, self_collision_pairs
 from planner.motion.world import Margins, Same, Standing
 from planner.refinement import Pair
-from scenarios.shapes import Convex, Hull, convex_parts, extents, middle
+from scenarios.shapes import Convex, Hull, Shape, convex_parts, extents, middle
 from scenarios.solids import geometry, polytope
 from sim.robot import RobotModel
-from sim.scene import SceneState
+from sim.scene import Held, SceneState
 
 JOINT_STEP = 0.02
 """Largest step of a joint, in rad, between two configurations that are looked at on a path."""
@@ -77,6 +77,7 @@ class _Fixed:
     def __init__(self, standing: Standing) -> None:
         groups = [_placed_group(Same(group)) for group in standing.groups]
         self.solids = [solid for group in groups for solid in group.solids]
+        self.names = [solid.name for solid in self.solids]
         self.transforms = [transform for group in groups for transform in group.transforms]
         self.lower = np.concatenate([group.lower for group in groups])[None]
         self.upper = np.concatenate([group.upper for group in groups])[None]
@@ -85,11 +86,18 @@ class _Fixed:
 class _Moving:
     """The robot and what it holds: first the spheres of the links, `arm` of them, then what rides on link 7."""
 
-    def __init__(self, robot: RobotModel, scene: SceneState) -> None:
+    def __init__(self, robot: RobotModel, opening: float, held: Held | None, shape: Shape | None) -> None:
         self._robot = robot
         arm = _arm_solids(robot)
-        self.solids = [*arm, *_riders(robot, scene)]
+        self.solids = [*arm, *_hand_solids(robot, opening)]
+        if held is not None and shape is not None:
+            X_7O = robot.model.frames[robot.tcp_id].placement * held.X_GO
+            parts = convex_parts(shape)
+            self.solids += [_solid(held.name, ARM_LINKS - 1, X_7O * X_OP, part) for part, X_OP in parts]
         self.arm = len(arm)
+        self.names = tuple(solid.name for solid in self.solids)
+        names = part_names(robot, held)
+        self.part = np.array([names.index(name) for name in self.names])
         self.link = np.array([solid.link for solid in self.solids])
         self.half = np.array([solid.half for solid in self.solids])
         self._p = np.array([solid.X.translation for solid in self.solids])
@@ -118,19 +126,22 @@ def _none(pair: Pair) -> bool:
 
 
 class ExactChecker:
-    """Convex solids in coal: for culprits, for lines near contact, for the audit of timed paths."""
+    """Convex solids in coal: for culprits, for lines near contact, for the audit of timed paths.
+
+    parts: names of what moves, the robot's links and the held body.
+    """
 
     def __init__(self, robot: RobotModel, scene: SceneState, margins: Margins | None = None) -> None:
         margins = Margins() if margins is None else margins
         self.checks = 0
         self._limits = np.stack([robot.q_min, robot.q_max])
         self._fixed = _fixed(Standing(scene))
-        self._moving = _Moving(robot, scene)
+        self._moving = _moving(robot, scene)
         parts = part_names(robot, scene.held)
+        self.parts = frozenset(parts)
         self._solids = [*self._moving.solids, *self._fixed.solids]
-        names = [solid.name for solid in self._moving.solids]
-        self._outward = _outward_pairs(parts, names, self._moving.link, self._fixed.solids, margins)
-        self._inward = _inward_pairs(parts, tuple(names), margins)
+        self._outward = _outward_pairs(parts, self._moving.part, self._moving.link, self._fixed.names, margins)
+        self._inward = _inward_pairs(parts, self._moving.names, margins)
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
 
     def is_free(self, q: np.ndarray) -> bool:
@@ -224,11 +235,10 @@ class _Pairs:
 
 
 def _outward_pairs(
-    parts: tuple[str, ...], names: list[str], link: np.ndarray, fixed: list[_Solid], margins: Margins
+    parts: tuple[str, ...], part: np.ndarray, link: np.ndarray, fixed: list[str], margins: Margins
 ) -> _Pairs:
     """Moving solids against what stands in the scene; link 0 never moves and is left out."""
-    rows = [parts.index(name) for name in names]
-    table = margins.table(parts, [solid.name for solid in fixed])[rows]
+    table = margins.table(parts, fixed)[part]
     table[link == 0] = -np.inf
     a, b = np.nonzero(table > -np.inf)
     return _Pairs(np.ascontiguousarray(a), np.ascontiguousarray(b), table[a, b])
@@ -237,6 +247,8 @@ def _outward_pairs(
 def _inward_pairs(parts: tuple[str, ...], names: tuple[str, ...], margins: Margins) -> _Pairs:
     """The robot's own solids against each other."""
     pairs, rows, a, b = _inward_numbers(parts, names)
+    if not (margins.allowed or margins.relaxed):
+        return _Pairs(a, b, np.zeros(len(rows)))
     margin = margins.within_robot(pairs)[rows]
     kept = margin > -np.inf
     return _Pairs(a[kept], b[kept], margin[kept])
@@ -252,6 +264,16 @@ def _inward_numbers(
     found = [(row, a, b) for row, (first, second) in enumerate(pairs) for a in solids[first] for b in solids[second]]
     rows, a, b = (np.array(column) for column in zip(*found, strict=True))
     return [frozenset(pair) for pair in pairs], rows, a, b
+
+
+def _moving(robot: RobotModel, scene: SceneState) -> _Moving:
+    shape = None if scene.held is None else scene.scenario.bodies[scene.held.name].shape
+    return _moving_of(robot, scene.opening, Same(scene.held, shape))
+
+
+@lru_cache(maxsize=64)
+def _moving_of(robot: RobotModel, opening: float, carried: Same) -> _Moving:
+    return _Moving(robot, opening, *carried.things)
 
 
 @lru_cache(maxsize=64)
@@ -272,16 +294,6 @@ def _hand_solids(robot: RobotModel, opening: float) -> list[_Solid]:
     X_7W = poses[robot.links[last]].inverse()
     hand = [solid for solid in robot.geometry if solid.link in robot.hand_links]
     return [_solid(solid.link, last, X_7W * poses[solid.link] * solid.X_LS, solid.shape) for solid in hand]
-
-
-def _riders(robot: RobotModel, scene: SceneState) -> list[_Solid]:
-    """Hand, fingers and held body, in link 7."""
-    solids = _hand_solids(robot, scene.opening)
-    if scene.held is None:
-        return solids
-    X_7O = robot.model.frames[robot.tcp_id].placement * scene.held.X_GO
-    parts = convex_parts(scene.scenario.bodies[scene.held.name].shape)
-    return [*solids, *(_solid(scene.held.name, ARM_LINKS - 1, X_7O * X_OP, part) for part, X_OP in parts)]
 
 
 def _solid(name: str, link: int, X: SE3, shape: Convex) -> _Solid:

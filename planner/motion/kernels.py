@@ -8,7 +8,14 @@ handed. For placements see `chain`.
 import numpy as np
 from numba import njit
 
-from planner.motion.apart import bounds_apart, out_of_bounds, point_near, solid_hits, sphere_hits
+from planner.motion.apart import (
+    bounds_apart,
+    out_of_bounds,
+    point_distance,
+    point_near,
+    solid_hits,
+)
+from planner.motion.sweep import part_within, room_for, speed, write_bends, write_relative, write_twists
 from planner.motion.tables import (
     BOUND,
     COUNT,
@@ -19,15 +26,25 @@ from planner.motion.tables import (
     OBSTACLE_COLUMNS,
     PART,
     PLACE,
+    RIDERS,
     UPPER,
     ArmArrays,
     SceneArrays,
 )
 
+_part = njit(inline="always")
+"""Written into its callers."""
+
+_lean = njit(cache=True, _nrt=False)
+"""Counts no references to the arrays that it handles, which takes most of the time otherwise, and can make none."""
+
 _ONE_EACH = np.arange(9.0)
 
+ROOM = 0.1
+"""Metres of room beyond which nobody looks."""
 
-@njit(cache=True)
+
+@_part
 def place_links(q, base, joints, links):
     """Write the placements of links 0 to 7 in W, links (8,12), at q (7,)."""
     for i in range(12):
@@ -53,7 +70,7 @@ def place_all_links(q, base, joints):
     return links
 
 
-@njit(cache=True)
+@_part
 def _place_points(links, row, points, placed):
     """Write `placed`: the points (n,≥3), given in the frame of links[row], in W."""
     for i in range(points.shape[0]):
@@ -62,7 +79,7 @@ def _place_points(links, row, points, placed):
             placed[i, r] = links[row, 9 + r] + turned + links[row, 3 * r + 2] * points[i, 2]
 
 
-@njit(cache=True)
+@_part
 def _place_spheres(links, spheres, first, placed):
     """Write `placed`: the spheres (n,4), those from first[k] on given in the frame of links[k], in W."""
     for k in range(links.shape[0]):
@@ -73,7 +90,7 @@ def _place_spheres(links, spheres, first, placed):
             placed[i, 3] = spheres[i, 3]
 
 
-@njit(cache=True)
+@_part
 def _place_solids(links, row, solids, placed):
     """Write `placed`: the solids, given in the frame of links[row], in W, with world bounds. Columns: `tables`."""
     for s in range(solids.shape[0]):
@@ -94,18 +111,33 @@ def _place_solids(links, row, solids, placed):
             placed[s, UPPER + r] = centre + reach
 
 
-@njit(cache=True)
-def _hand_hits(solids, own, obstacles, corners, margins):
-    """Does any of the placed solids come too near to an obstacle?"""
+@_part
+def _write_gaps(x0, y0, z0, x1, y1, z1, bounds, margins, part, gaps):
+    """Write gaps (n,): how far world bounds (lowest, highest) and those of the obstacles, bounds (6,n), are apart along
+    the axis where that is most, less the part's margins."""
+    # No branch, one column after the other: this becomes vector instructions.
+    lx, ly, lz, hx, hy, hz = bounds[0], bounds[1], bounds[2], bounds[3], bounds[4], bounds[5]
+    margin = margins[part]
+    for k in range(gaps.shape[0]):
+        x, y, z = max(lx[k] - x1, x0 - hx[k]), max(ly[k] - y1, y0 - hy[k]), max(lz[k] - z1, z0 - hz[k])
+        gaps[k] = max(x, max(y, z)) - margin[k]
+
+
+@_part
+def _solid_room(solids, s, own, scene, gaps, room):
+    """Metres, at most `room`, that placed solid s may move before it comes too near to an obstacle; −1: it is."""
     # The loop over the obstacles is in here: every call counts references to every array.
-    for k in range(obstacles.shape[0]):
-        for s in range(solids.shape[0]):
-            margin = margins[int(solids[s, PART]), k]
-            if margin == -np.inf or bounds_apart(solids, s, obstacles, k, margin):
-                continue
-            if solid_hits(solids, s, own, obstacles, k, corners, margin):
-                return True
-    return False
+    part = int(solids[s, PART])
+    x0, y0, z0 = solids[s, LOWER], solids[s, LOWER + 1], solids[s, LOWER + 2]
+    x1, y1, z1 = solids[s, UPPER], solids[s, UPPER + 1], solids[s, UPPER + 2]
+    _write_gaps(x0, y0, z0, x1, y1, z1, scene.bounds, scene.margins, part, gaps)
+    for k in range(gaps.shape[0]):
+        if gaps[k] < 0.0:
+            if solid_hits(solids, s, own, scene.obstacles, k, scene.corners, scene.margins[part, k]):
+                return -1.0
+            room = 0.0
+        room = min(room, gaps[k])
+    return max(room, 0.0)
 
 
 @njit(cache=True)
@@ -116,102 +148,145 @@ def hand_contacts(links, solids, own, obstacles, corners, margins):
     """
     placed = np.empty((solids.shape[0], OBSTACLE_COLUMNS))
     _place_solids(links, 0, solids, placed)
-    hits = np.empty(obstacles.shape[0], dtype=np.bool_)
+    hits = np.zeros(obstacles.shape[0], dtype=np.bool_)
     for k in range(obstacles.shape[0]):
-        hits[k] = _hand_hits(placed, own, obstacles[k : k + 1], corners, margins[:, k : k + 1])
+        for s in range(solids.shape[0]):
+            margin = margins[int(solids[s, PART]), k]
+            if margin == -np.inf or bounds_apart(placed, s, obstacles, k, margin):
+                continue
+            if solid_hits(placed, s, own, obstacles, k, corners, margin):
+                hits[k] = True
+                break
     return hits
 
 
-@njit(cache=True)
-def _links_hit(covers, spheres, first, obstacles, corners, margins):
-    """Do the placed spheres of links 1 to 7 come too near to something?"""
-    for link in range(1, 8):
-        x, y, z, cover = covers[link, 0], covers[link, 1], covers[link, 2], covers[link, 3]
-        for k in range(obstacles.shape[0]):
-            margin = margins[link, k]
-            if margin == -np.inf or out_of_bounds(x, y, z, cover + margin, obstacles, k):
-                continue
-            for s in range(int(first[link]), int(first[link + 1])):
-                reach = spheres[s, 3] + margin
-                if sphere_hits(spheres[s, 0], spheres[s, 1], spheres[s, 2], reach, obstacles, k, corners):
-                    return True
-    return False
-
-
-@njit(cache=True)
-def _spheres_meet(spheres, s, others, t, margin):
-    dx, dy, dz = spheres[s, 0] - others[t, 0], spheres[s, 1] - others[t, 1], spheres[s, 2] - others[t, 2]
-    reach = spheres[s, 3] + others[t, 3] + margin
-    return dx * dx + dy * dy + dz * dz < reach * reach
-
-
-@njit(cache=True)
-def _links_meet(covers, spheres, first, pairs):
-    for n in range(pairs.shape[0]):
-        a, b, margin = int(pairs[n, 0]), int(pairs[n, 1]), pairs[n, 2]
-        if not _spheres_meet(covers, a, covers, b, margin):
+@_part
+def _link_room(covers, spheres, first, link, scene, gaps, room):
+    """The same for the placed spheres of a link."""
+    x, y, z, cover = covers[link, 0], covers[link, 1], covers[link, 2], covers[link, 3]
+    _write_gaps(
+        x - cover, y - cover, z - cover, x + cover, y + cover, z + cover, scene.bounds, scene.margins, link, gaps
+    )
+    obstacles = scene.obstacles
+    for k in range(gaps.shape[0]):
+        if gaps[k] > room or (gaps[k] > 0.0 and room == 0.0):
             continue
-        for s in range(int(first[a]), int(first[a + 1])):
-            for t in range(int(first[b]), int(first[b + 1])):
-                if _spheres_meet(spheres, s, spheres, t, margin):
-                    return True
-    return False
+        margin = scene.margins[link, k]
+        for s in range(int(first[link]), int(first[link + 1])):
+            x, y, z, reach = spheres[s, 0], spheres[s, 1], spheres[s, 2], spheres[s, 3] + margin
+            if out_of_bounds(x, y, z, reach + room, obstacles, k):
+                continue
+            gap = point_distance(x, y, z, obstacles, k) - reach
+            if gap < 0.0 and point_near(x, y, z, reach, obstacles, k, scene.corners):
+                return -1.0
+            room = min(room, max(gap, 0.0))
+    return room
 
 
-@njit(cache=True)
-def _beyond_bound(spheres, t, solids, s, margin):
-    """Is placed sphere t further than the margin from the sphere about placed solid s?"""
+@_part
+def _spheres_beyond(spheres, s, others, t, gap):
+    dx, dy, dz = spheres[s, 0] - others[t, 0], spheres[s, 1] - others[t, 1], spheres[s, 2] - others[t, 2]
+    reach = spheres[s, 3] + others[t, 3] + gap
+    return dx * dx + dy * dy + dz * dz >= reach * reach
+
+
+@_part
+def _links_part(covers, spheres, first, pairs, relative, part):
+    """The part of the edge, at most `part`, along which no two links of a pair can come too near; −1: they are."""
+    for n in range(pairs.shape[0]):
+        outer, inner, margin = int(pairs[n, 0]), int(pairs[n, 1]), pairs[n, 2]
+        rate = relative[inner, outer]
+        if _spheres_beyond(covers, outer, covers, inner, margin + rate * part):
+            continue
+        for s in range(int(first[outer]), int(first[outer + 1])):
+            for t in range(int(first[inner]), int(first[inner + 1])):
+                if _spheres_beyond(spheres, s, spheres, t, margin + rate * part):
+                    continue
+                if not _spheres_beyond(spheres, s, spheres, t, margin):
+                    return -1.0
+                dx, dy = spheres[s, 0] - spheres[t, 0], spheres[s, 1] - spheres[t, 1]
+                dz = spheres[s, 2] - spheres[t, 2]
+                gap = np.sqrt(dx * dx + dy * dy + dz * dz) - spheres[s, 3] - spheres[t, 3] - margin
+                part = max(0.0, gap) / (rate + 1e-12)
+    return part
+
+
+@_part
+def _beyond_bound(spheres, t, solids, s, gap):
+    """Is placed sphere t further than the gap from the sphere about placed solid s?"""
     p = PLACE + 9
     dx, dy, dz = spheres[t, 0] - solids[s, p], spheres[t, 1] - solids[s, p + 1], spheres[t, 2] - solids[s, p + 2]
-    return dx * dx + dy * dy + dz * dz > (spheres[t, 3] + solids[s, BOUND] + margin) ** 2
+    return dx * dx + dy * dy + dz * dz > (spheres[t, 3] + solids[s, BOUND] + gap) ** 2
 
 
-@njit(cache=True)
-def _hand_meets_arm(solids, own, covers, spheres, first, pairs):
+@_part
+def _hand_part(solids, own, covers, spheres, first, pairs, relative, part):
+    """The same for solids on the hand and links."""
     for n in range(pairs.shape[0]):
-        s, link = int(pairs[n, 0]), int(pairs[n, 1])
-        if _beyond_bound(covers, link, solids, s, pairs[n, 2]):
+        s, link, margin = int(pairs[n, 0]), int(pairs[n, 1]), pairs[n, 2]
+        rate = relative[link, RIDERS]
+        if _beyond_bound(covers, link, solids, s, margin + rate * part):
             continue
         for t in range(int(first[link]), int(first[link + 1])):
-            if _beyond_bound(spheres, t, solids, s, pairs[n, 2]):
+            if _beyond_bound(spheres, t, solids, s, margin + rate * part):
                 continue
-            reach = spheres[t, 3] + pairs[n, 2]
-            if point_near(spheres[t, 0], spheres[t, 1], spheres[t, 2], reach, solids, s, own):
-                return True
-    return False
+            x, y, z, reach = spheres[t, 0], spheres[t, 1], spheres[t, 2], spheres[t, 3] + margin
+            gap = point_distance(x, y, z, solids, s) - reach
+            if gap < 0.0 and point_near(x, y, z, reach, solids, s, own):
+                return -1.0
+            if gap < rate * part:
+                part = max(0.0, gap) / (rate + 1e-12)
+    return part
 
 
-@njit(cache=True)
-def _is_free(q, arm, scene, links, spheres, covers, solids):
-    """The check itself; the last four are workspaces."""
+@_part
+def _free_part(q, way, arm, scene, room, links, spheres, covers, solids, twists, gaps, bends, relative):
+    """The part of the edge, either way from q on it, that is surely free; −1: q is not.
+
+    way (7,): from the edge's beginning to its end. room: metres beyond which nobody looks. bends, relative: of the
+    edge, see `sweep`. The other arrays are workspaces.
+    """
     place_links(q, arm.base, arm.joints, links)
     _place_solids(links, 7, arm.solids, solids)
-    if _hand_hits(solids, arm.corners, scene.obstacles, scene.corners, scene.margins):
-        return False
+    write_twists(way, links, twists)
+    part, p = 1.0, PLACE + 9
+    for s in range(solids.shape[0]):
+        radius = np.sqrt(solids[s, HALF] ** 2 + solids[s, HALF + 1] ** 2 + solids[s, HALF + 2] ** 2)
+        rate = speed(solids[s, p], solids[s, p + 1], solids[s, p + 2], radius, 7, links, twists)
+        needed = min(room, room_for(part, rate, bends[RIDERS]))
+        found = _solid_room(solids, s, arm.corners, scene, gaps, needed)
+        if found < 0.0:
+            return -1.0
+        part = min(part, part_within(found, rate, bends[RIDERS]))
     _place_spheres(links, arm.spheres, arm.first, spheres)
     _place_spheres(links, arm.covers, _ONE_EACH, covers)
-    if _links_hit(covers, spheres, arm.first, scene.obstacles, scene.corners, scene.margins):
-        return False
-    if _links_meet(covers, spheres, arm.first, scene.link_pairs):
-        return False
-    return not _hand_meets_arm(solids, arm.corners, covers, spheres, arm.first, scene.solid_pairs)
+    for link in range(7, 0, -1):
+        rate = speed(covers[link, 0], covers[link, 1], covers[link, 2], covers[link, 3], link, links, twists)
+        needed = min(room, room_for(part, rate, bends[link]))
+        found = _link_room(covers, spheres, arm.first, link, scene, gaps, needed)
+        if found < 0.0:
+            return -1.0
+        part = min(part, part_within(found, rate, bends[link]))
+    part = _links_part(covers, spheres, arm.first, scene.link_pairs, relative, part)
+    if part < 0.0:
+        return -1.0
+    return _hand_part(solids, arm.corners, covers, spheres, arm.first, scene.solid_pairs, relative, part)
 
 
-@njit(cache=True)
+@_part
 def _between(qa, qb, fraction, q):
     for k in range(7):
         q[k] = qa[k] + (qb[k] - qa[k]) * fraction
 
 
-@njit(cache=True)
-def _edge_steps(qa, qb, arm, links, q, joint_step, travel_step):
+@_lean
+def _edge_steps(qa, qb, arm, links, q, places, joint_step, travel_step):
     """Number of equal steps from qa to qb of at most `joint_step` rad a joint and about `travel_step` metres of
-    the hand (its chords over both halves of the edge, a tenth added)."""
+    the hand (its chords over both halves of the edge, a tenth added). places (3,n,3): workspace."""
     widest = 0.0
     for k in range(7):
         widest = max(widest, abs(qb[k] - qa[k]))
     n = arm.probes.shape[0]
-    places = np.empty((3, n, 3))
     for half in range(3):
         _between(qa, qb, half / 2, q)
         place_links(q, arm.base, arm.joints, links)
@@ -224,6 +299,36 @@ def _edge_steps(qa, qb, arm, links, q, joint_step, travel_step):
                 square += (places[half + 1, m, i] - places[half, m, i]) ** 2
             travel = max(travel, 2.2 * np.sqrt(square))
     return max(1, int(np.ceil(widest / joint_step)), int(np.ceil(travel / travel_step)))
+
+
+@_lean
+def _blocked(qa, qb, arm, scene, done, links, q, spheres, covers, solids, twists, gaps, way, bends, relative):
+    """Configurations checked on the edge, less than 0 if the last was in collision. done (n+1,): those of its n+1
+    configurations that needn't be checked; the arrays after it are workspaces."""
+    for k in range(7):
+        way[k] = qb[k] - qa[k]
+    write_bends(way, arm.turning, bends)
+    write_relative(way, arm.turning, relative)
+    count = done.shape[0] - 1
+    checks, stride = 0, 1
+    while stride < count:
+        stride *= 2
+    first = count
+    while stride >= 1:
+        for i in range(first, count + 1, 2 * stride):
+            if done[i]:
+                continue
+            checks += 1
+            _between(qa, qb, i / count, q)
+            part = _free_part(q, way, arm, scene, ROOM, links, spheres, covers, solids, twists, gaps, bends, relative)
+            if part < 0.0:
+                return -checks
+            around = int(count * part)
+            for j in range(max(0, i - around), min(count, i + around) + 1):
+                done[j] = True
+        stride //= 2
+        first = stride
+    return checks
 
 
 @njit(cache=True)
@@ -246,9 +351,15 @@ def unpack(packed):
         _table(packed, 6),
         _table(packed, 7),
         _table(packed, 8),
+        _table(packed, 9),
     )
     scene = SceneArrays(
-        _table(packed, 9), _table(packed, 10), _table(packed, 11), _table(packed, 12), _table(packed, 13)
+        _table(packed, 10),
+        _table(packed, 11),
+        _table(packed, 12),
+        _table(packed, 13),
+        _table(packed, 14),
+        _table(packed, 15),
     )
     return arm, scene
 
@@ -259,27 +370,16 @@ def edge_is_free(qa, qb, packed, joint_step, travel_step):
 
     `packed`: robot and scene, see `tables.pack`. Returns the answer and the number of configurations
     checked. The end comes first, then the middle, then the quarters: a blocked edge is found
-    blocked soon.
+    blocked soon. What is surely free because it is near to one that has room is left out.
     """
     arm, scene = unpack(packed)
     for k in range(7):
         if not (arm.limits[0, k] <= qb[k] <= arm.limits[1, k]):
             return False, 1
-    links, q = np.empty((8, 12)), np.empty(7)
+    links, q, way, bends = np.empty((8, 12)), np.empty(7), np.empty(7), np.empty(9)
+    twists, relative, gaps = np.empty((8, 6)), np.empty((8, 9)), np.empty(scene.obstacles.shape[0])
     spheres, covers = np.empty((arm.spheres.shape[0], 4)), np.empty((8, 4))
-    solids = np.empty((arm.solids.shape[0], OBSTACLE_COLUMNS))
-    count = _edge_steps(qa, qb, arm, links, q, joint_step, travel_step)
-    if not _is_free(qb, arm, scene, links, spheres, covers, solids):
-        return False, 1
-    checks = 1
-    stride = 1
-    while 2 * stride < count:
-        stride *= 2
-    while stride >= 1:
-        for i in range(stride, count, 2 * stride):
-            checks += 1
-            _between(qa, qb, i / count, q)
-            if not _is_free(q, arm, scene, links, spheres, covers, solids):
-                return False, checks
-        stride //= 2
-    return True, checks
+    solids, places = np.empty((arm.solids.shape[0], OBSTACLE_COLUMNS)), np.empty((3, arm.probes.shape[0], 3))
+    done = np.zeros(1 + _edge_steps(qa, qb, arm, links, q, places, joint_step, travel_step), dtype=np.bool_)
+    checks = _blocked(qa, qb, arm, scene, done, links, q, spheres, covers, solids, twists, gaps, way, bends, relative)
+    return checks > 0, abs(checks)

@@ -11,6 +11,7 @@ from planner.failure import MotionFailure
 from planner.motion.blame import blame
 from planner.motion.checking import CollisionChecker
 from planner.motion.collision import FastChecker, hand_hits, part_names
+from planner.motion.enclosed import LOOKS, enclosed_end, walls_about
 from planner.motion.exact import Contact, ExactChecker
 from planner.motion.ik import ClosedFormIK
 from planner.motion.ik_numeric import track_numerically
@@ -44,8 +45,8 @@ class MotionSettings:
 
     planner: str = "RRTConnect"
     goal_bias: float = 0.05
-    restarts: int = 3
-    step: float = 0.8
+    restarts: int = 4
+    step: float = 1.2
     margin: float = FREE_MARGIN
     line_margin: float = 0.002
     audit_margin: float = 0.001
@@ -254,7 +255,7 @@ class MotionPlanner:
         path = next((np.stack([scene.q, q]) for q in reached if checker.edge_is_free(scene.q, q)), None)
         if path is None:
             query = Query(scene.q, reached, self._limits, seed, max_checks)
-            path = plan_path(query, checker, self._path_settings)
+            path = plan_path(query, checker, self._path_settings, lambda: enclosed_end(checker, query) is not None)
             if path is not None:
                 path = shortened(path, checker, np.random.default_rng(seed))
         self.work.add("checks" if isinstance(checker, FastChecker) else "exact_checks", checker.checks)
@@ -272,13 +273,30 @@ class MotionPlanner:
         """Who is in the way, once no path was found: a motion after all if the way without the movables hits none."""
         reason = f"no path within {max_checks} checks"
         movable = movables(scene)
-        path = self._polyline(scene.without(movable), ends, seed, max_checks) if movable else None
+        bare = scene.without(movable)
+        walled = self._walled_in(bare, ends, seed)
+        if walled is not None:
+            return walled
+        path = self._polyline(bare, ends, seed, max_checks) if movable else None
         if path is None:
             return MotionFailure(f"{reason}, whatever is moved aside")
         contacts = self._contacts(scene, path, ends.margins)
         if contacts:
             return blame(f"{reason}; the way without movable bodies hits", contacts, movable)
         return self._timed(scene, path, ends.margins) or MotionFailure(reason)
+
+    def _walled_in(self, scene: SceneState, ends: Ends, seed: int) -> MotionFailure | None:
+        """What there is no way out of, at the start or at every goal."""
+        checker, reached = self._checker(scene, ends)
+        query = Query(scene.q, reached, self._limits, seed, 0)
+        end = enclosed_end(checker, query)
+        self.work.add("checks", checker.checks)
+        if end is None:
+            return None
+        which, q = end
+        self.work.add("exact_checks", LOOKS)
+        walls = walls_about(self._exact(scene, ends.margins), q, query)
+        return MotionFailure(f"the {which} is walled in by {', '.join(walls) or 'the arm itself'}")
 
     def _timed(self, scene: SceneState, path: np.ndarray, margins: Margins) -> Trajectory | None:
         margins = replace(margins, free=self.settings.audit_margin)

@@ -42,7 +42,7 @@ class PathSettings:
     planner: str = "RRTConnect"
     goal_bias: float = 0.05
     restarts: int = 3
-    step: float = 0.8
+    step: float = 1.2
 
     def __post_init__(self) -> None:
         if self.planner not in _PLANNERS:
@@ -63,11 +63,18 @@ class Query:
     max_checks: int
 
 
-def plan_path(query: Query, checker: CollisionChecker, settings: PathSettings) -> np.ndarray | None:
-    """Waypoints (n,7) of a collision-free polyline from the start to one of the goals, or None within the budget."""
+def plan_path(
+    query: Query, checker: CollisionChecker, settings: PathSettings, is_hopeless: Callable[[], bool] | None = None
+) -> np.ndarray | None:
+    """Waypoints (n,7) of a collision-free polyline from the start to one of the goals, or None within the budget.
+
+    is_hopeless is asked before the search begins again; if so, it doesn't.
+    """
     util.setLogLevel(util.LogLevel.LOG_NONE)
     found: list[np.ndarray] = []
     for run in range(settings.restarts):
+        if run > 0 and not found and is_hopeless is not None and is_hopeless():
+            break
         path = _search(query, checker, settings, query.seed + run, query.max_checks // settings.restarts)
         found += [] if path is None else [path]
         if found and settings.planner != "best-of-n-RRT":

@@ -44,10 +44,11 @@ class Same:
 
     def __init__(self, *things: Any) -> None:
         self.things = things
-        self._ids = tuple(id(thing) for thing in things)
+        self._ids = tuple(map(id, things))
+        self._hash = hash(self._ids)
 
     def __hash__(self) -> int:
-        return hash(self._ids)
+        return self._hash
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Same) and other._ids == self._ids
@@ -92,9 +93,10 @@ class Standing:
         self.scenario = scene.scenario
         self.poses = tuple((name, scene.poses[name]) for name in sorted(movables(scene)))
         self._ids = (id(self.scenario), tuple((name, id(X_WO)) for name, X_WO in self.poses))
+        self._hash = hash(self._ids)
 
     def __hash__(self) -> int:
-        return hash(self._ids)
+        return self._hash
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Standing) and other._ids == self._ids

@@ -86,7 +86,7 @@ def test_the_full_run_has_thirty_tables_and_twenty_seeds_and_the_quick_one_fewer
     full, quick = planned(False), planned(True)
     assert sum(job.table is not None for job in full) == 30
     assert {job.seeds for job in full} == {20}
-    assert full[0] == Job(None, 20, 2, 0.0)
+    assert full[0] == Job(None, 20, 2, 30.0)
     assert len(quick) < len(full)
     assert max(job.seeds for job in quick) < 20
 
@@ -143,8 +143,12 @@ def test_a_lowered_goal_collides_and_a_walled_one_is_free_but_out_of_reach(arena
     assert behind is not None
     assert not motion.free(low.query.scene, low.query.goal)
     assert motion.free(behind.query.scene, behind.query.goal)
-    for hopeless in (low, behind):
-        assert isinstance(motion.move(hopeless.query.scene, [hopeless.query.goal]), MotionFailure)
+    failures = [motion.move(hopeless.query.scene, [hopeless.query.goal]) for hopeless in (low, behind)]
+    assert all(isinstance(failure, MotionFailure) for failure in failures)
+    assert "the goal is in collision" in failures[0].reason
+    assert "the goal is walled in by" in failures[1].reason
+    assert "wall_0" in failures[1].reason
+    assert not failures[1].culprits
 
 
 def test_pybullet_planning_looks_at_the_same_pairs_and_finds_a_way(arena):

@@ -8,6 +8,7 @@ from pinocchio import SE3
 
 from planner.motion.collision import FastChecker, hand_hits
 from planner.motion.exact import ExactChecker
+from planner.motion.kernels import edge_is_free
 from planner.motion.world import Margins, movables, obstacles
 from planner.refinement import pairs
 from scenarios.scenario import Scenario
@@ -112,6 +113,26 @@ def test_a_wall_thinner_than_a_step_is_not_jumped(robot, table, at):
         assert checker.is_free(right)
         assert checker.is_free(left)
         assert not checker.edge_is_free(right, left)
+
+
+def test_what_is_left_out_of_an_edge_because_there_is_room_is_free(robot, table):
+    rng = np.random.default_rng(3)
+    disagreeing, free, looked, steps = 0, 0, 0, 0
+    for _ in range(8):
+        packed = FastChecker(robot, _random_scene(table, rng), Margins(0.005)).packed
+        for qa in rng.uniform(0.5 * robot.q_min, 0.5 * robot.q_max, (30, 7)):
+            if not edge_is_free(qa, qa, packed, 1.0, np.inf)[0]:
+                continue
+            qb = qa + rng.normal(size=7) * 0.2
+            count = int(np.ceil(np.abs(qb - qa).max() / 0.02))
+            points = qa + (qb - qa) * (np.arange(1, count + 1) / count)[:, None]
+            answer, checks = edge_is_free(qa, qb, packed, 0.02, np.inf)
+            disagreeing += answer != all(edge_is_free(q, q, packed, 1.0, np.inf)[0] for q in points)
+            if answer:
+                free, looked, steps = free + 1, looked + checks, steps + count
+    assert disagreeing == 0
+    assert free > 20
+    assert looked < 0.7 * steps
 
 
 def test_a_configuration_beyond_a_joint_limit_is_not_free(robot, scene):

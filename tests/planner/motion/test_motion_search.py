@@ -104,6 +104,26 @@ def test_shortcuts_keep_ends_and_freedom_and_make_the_path_shorter(robot, scene,
     assert _is_free(short, robot, scene)
 
 
+def test_the_exact_model_s_path_is_left_its_corners_but_no_detour(robot, scene):
+    exact, start = ExactChecker(robot, scene), scene.q
+    there = start + np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    short = shortened(np.stack([start, there, start, there]), exact, np.random.default_rng(0))
+    assert np.array_equal(short, np.stack([start, there]))
+
+
+def test_a_hopeless_search_is_not_begun_again(checker, query):
+    asked = []
+    settings = PathSettings("RRT", restarts=3)
+
+    def is_hopeless() -> bool:
+        asked.append(checker.checks)
+        return True
+
+    assert plan_path(replace(query, max_checks=90), checker, settings, is_hopeless) is None
+    assert len(asked) == 1
+    assert checker.checks == asked[0]
+
+
 def test_an_unknown_planner_is_refused_with_the_known_ones():
     with pytest.raises(ValueError, match="'RRTX', known: RRTConnect"):
         PathSettings("RRTX")
