@@ -11,6 +11,7 @@ from planner.motion.motion_planner import MotionPlanner
 from planner.refinement import Phase
 from planner.task.symbols import Fact, GroundAction
 from scenarios.checks import immovable
+from scenarios.goal import is_crumb
 from scenarios.scenario import Body, Scenario
 from scenarios.shapes import bounding_radius
 from scenarios.solids import body_solid
@@ -42,13 +43,18 @@ class Later:
 @dataclass(frozen=True)
 class Deed:
     """What is done: a sentence in the past tense for the story, faults for the plant, what is wanted from now on (None:
-    as before), and what follows. names: the bodies concerned."""
+    as before), and what follows. names: the bodies and regions concerned. is_certain: it matters whatever comes of it,
+    as its draw made sure (else it must be seen to have changed something). is_in_the_way: of the running motion.
+    loosens: what is named first may part from the hand."""
 
     sentence: str
     faults: tuple[Fault, ...] = ()
     goal: frozenset[Fact] | None = None
     later: Later | None = None
     names: tuple[str, ...] = ()
+    is_certain: bool = False
+    is_in_the_way: bool = False
+    loosens: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,6 +105,24 @@ class Occasion:
         wanted = [fact.args[0] for fact in sorted(agenda.goal - facts) if fact.args]
         names = dict.fromkeys([*(action.args[0] for action in self.left), *wanted])
         return [name for name in names if name in self.truth.poses and name != self.held]
+
+    def lacking(self) -> list[str]:
+        """Bodies that are there, not in the hand, and that the goal still lacks."""
+        agenda = self.machine.agenda
+        missing = agenda.goal - agenda.facts(self.machine.context.scene)
+        names = sorted({fact.args[0] for fact in missing if fact.args})
+        return [name for name in names if name in self.truth.poses and name != self.held]
+
+    def is_crumb(self, name: str) -> bool:
+        """Is a body a crumb?"""
+        return is_crumb(self.scenario.bodies[name], self.scenario.robot.model)
+
+    def tools(self) -> list[str]:
+        """Sponges that are there and still needed."""
+        bodies = self.scenario.bodies
+        needed = {arg for action in self.left for arg in action.args} | set(self.lacking())
+        wipes = any(self.is_crumb(name) for name in self.lacking())
+        return [name for name in self.truth.poses if bodies[name].tool == "sponge" and (wipes or name in needed)]
 
     def table_height(self) -> float:
         """Height of the table's top in W."""

@@ -1,5 +1,6 @@
 """The arm's one controller: position, impedance and force laws on one torque QP, without bumps between them."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -200,6 +201,17 @@ class ArmController:
     def contact_force(self) -> float:
         """Smoothed normal force in N along the contact frame's z axis; pressing is positive."""
         return float(self._normal @ self._wrench.smooth[:3])
+
+    @property
+    def felt(self) -> float:
+        """Force in N on the hand from outside, in whatever direction, as felt just now."""
+        x, y, z = self._wrench.raw[:3].tolist()
+        return math.sqrt(x * x + y * y + z * z)
+
+    @property
+    def is_still(self) -> bool:
+        """Is the arm at rest?"""
+        return self._state is not None and float(np.abs(self._state.v).max()) < AT_REST
 
     @property
     def contact_wrench(self) -> Wrench:
