@@ -14,6 +14,7 @@ from sim.robot import RobotModel
 from sim.wrench import Wrench
 from skills.control.bridge import Bridge
 from skills.control.contact import ContactWrench, Touch
+from skills.control.cushion import cushion
 from skills.control.force import ForceLoop, smooth_step
 from skills.control.limits import ApproachLimit, Row
 from skills.control.momentum import MomentumObserver
@@ -276,6 +277,8 @@ class ArmController:
         self.lap("state")
         tasks, wrench, limits = self._law(state)
         feedforward = self._bridge.advance() - state.J.T @ wrench - self._compensation()
+        if self._unexplained is not None:
+            feedforward += cushion(state, self._robot)
         self.lap("law")
         solution = self._qp.solve(state, tasks, feedforward, limits)
         self._course.advance(self._period)

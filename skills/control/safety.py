@@ -13,6 +13,9 @@ from numba import njit
 ALERT = 0.9
 """Share of a safety limit at which the arm stops, so that the limit itself is not passed."""
 
+FORCE_ALERT = 0.75
+"""The same of the contact force: what is hit goes on pressing while the arm comes to rest."""
+
 TORQUE_ALERT = 0.98
 """The same of a joint's torque: the QP keeps it within its limit anyway."""
 
@@ -91,7 +94,7 @@ class SafetyLimits:
     work stays below 3 Nm; 1 Nm of joint friction, masses 20 % wrong and a sensor 4 ms late below 10 on joint 2
     (when the weight is first felt) and 4 on the others."""
 
-    contact_force: float = 120.0
+    contact_force: float = 60.0
     speed: float = 2.5
     collision: np.ndarray = field(default_factory=lambda: np.array([8.0, 14.0, 6.0, 8.0, 4.0, 4.0, 3.0]))
 
@@ -112,7 +115,7 @@ class Guard:
         """Look at the contact force (3,) in N."""
         x, y, z = force.tolist()
         size = math.sqrt(x * x + y * y + z * z)
-        self._forced = self._longer(self._forced, size > ALERT * self._limits.contact_force)
+        self._forced = self._longer(self._forced, size > FORCE_ALERT * self._limits.contact_force)
         return ForceTooHigh(size, self._limits.contact_force) if self._forced > FORCE_PATIENCE else None
 
     def speed(self, V: np.ndarray) -> Stop | None:
