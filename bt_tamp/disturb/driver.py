@@ -19,6 +19,7 @@ from planner.motion.motion_planner import MotionPlanner
 from scenarios.disturbance import Disturbance, Moment
 from sim.bullet import BulletPlant
 from sim.disturbance import HAIR, DisturbedPlant
+from sim.world_faults import BinShifted
 
 WHILE_PLANNING = 0.1
 """Share of the instances that fall into the first planning."""
@@ -223,4 +224,5 @@ class Driver:
             mattered=deed.is_certain,
             is_urgent=running is not None
             and (deed.is_in_the_way or not frozenset(running.args).isdisjoint(deed.names)),
+            shifts={fault.region: fault.by for fault in deed.faults if isinstance(fault, BinShifted)},
         )

@@ -32,6 +32,9 @@ from scenarios.scenario import Scenario
 from sim.disturbance import DisturbedPlant
 from sim.plant import Command
 
+STANDS = ("run_started", "plan_installed", "action_started", "action_done", "action_failed")
+"""Events at which it is written down how things stand: a run that is killed goes on from the last."""
+
 SAMPLE_EVERY = 5
 """Control ticks between two samples of the signals and two looks at the true contacts: 100 Hz."""
 
@@ -107,6 +110,8 @@ def run_scenario(
             tally.failed[data["action"]] += 1
             tally.reasons[data["action"]] = data["reason"]
         tally.befallen.hear(kind, tally.t, data)
+        if kind in STANDS and recorder.is_kept:
+            recorder.state(state_of(machine))
         _report(recorder, tally.t, kind, data, machine.planner.thinking.rounds)
         if driver is not None:
             driver.hear(kind, tally.t, data.get("phase", ""), data.get("action", ""))
