@@ -15,12 +15,23 @@ from bt_tamp.disturb.names import CLASSES
 from bt_tamp.disturb.robot import moved_unseen
 from bt_tamp.executive.seams import Seams
 from planner.refinement import Phase
+from planner.task.symbols import GroundAction
 from scenarios.goal import goal_text, parse_goal
 from scenarios.scenario import Body, Scenario
 from scenarios.shapes import Box
 from sim.disturbance import FOREVER
 
-Fits = Callable[[Phase], bool]
+
+@dataclass(frozen=True)
+class Prospect:
+    """A phase that is to come, the actions from its own on, and the scene."""
+
+    phase: Phase
+    later: tuple[GroundAction, ...]
+    scenario: Scenario
+
+
+Fits = Callable[[Prospect], bool]
 """May it come during such a phase?"""
 
 Strike = Callable[[], None]
@@ -35,32 +46,41 @@ SPELLS = 12
 STRAY, CRUMB, POST = "stray_box", "stray_crumb", "stray_post"
 
 
-def _always(phase: Phase) -> bool:
+def _always(to_come: Prospect) -> bool:
     return True
 
 
-def _holding(phase: Phase) -> bool:
-    return phase.held is not None and phase.kind not in ("open",)
+def _holding(to_come: Prospect) -> bool:
+    return to_come.phase.held is not None and to_come.phase.kind != "open"
 
 
-def _moving(phase: Phase) -> bool:
-    return phase.kind in ("move", "approach", "slide")
+def _moving(to_come: Prospect) -> bool:
+    return to_come.phase.kind in ("move", "approach", "slide")
 
 
-def _before_grasp(phase: Phase) -> bool:
+def _before_grasp(to_come: Prospect) -> bool:
+    phase = to_come.phase
     return phase.kind == "approach" and phase.held is None and phase.name == "approach"
 
 
-def _driven(phase: Phase) -> bool:
-    return phase.kind not in ("open", "close")
+def _driven(to_come: Prospect) -> bool:
+    return to_come.phase.kind not in ("open", "close")
 
 
-def _feeling(phase: Phase) -> bool:
+def _feeling(to_come: Prospect) -> bool:
+    phase = to_come.phase
     return phase.kind in ("touch", "slide") or (phase.held is not None and phase.kind == "move")
 
 
-def _stroking(phase: Phase) -> bool:
-    return phase.kind == "slide"
+def _stroking(to_come: Prospect) -> bool:
+    return to_come.phase.kind == "slide"
+
+
+def _before_tool(to_come: Prospect) -> bool:
+    """Is a tool still to be taken up?"""
+    picked = [action.args[0] for action in to_come.later if action.name == "pick"]
+    is_taken = to_come.phase.kind in ("open", "close") or to_come.phase.held is not None
+    return any(to_come.scenario.bodies[name].tool for name in picked[1 if is_taken else 0 :])
 
 
 def _unchanged(scenario: Scenario) -> Scenario:
@@ -129,8 +149,10 @@ KINDS: dict[str, Kind] = {
     "stroke-blocked": Kind(partial(world.path_blocked, name=POST), _stroking, False, partial(with_late, _POST, None)),
     "knocked-from-hand": Kind(world.knocked_from_hand, _holding, False),
     "slipping": Kind(world.slipping, _holding, False),
-    "sponge-far": Kind(world.sponge_far),
-    "sponge-covered": Kind(partial(world.sponge_covered, cover=STRAY), amend=partial(with_late, _STRAY, None)),
+    "sponge-far": Kind(world.sponge_far, _before_tool),
+    "sponge-covered": Kind(
+        partial(world.sponge_covered, cover=STRAY), _before_tool, amend=partial(with_late, _STRAY, None)
+    ),
     "bin-shifted": Kind(world.bin_shifted),
     "crumbs-beside-pan": Kind(world.crumbs_beside_pan),
     "goal-changed": Kind(world.goal_changed),

@@ -43,18 +43,19 @@ class Stake:
 
 @dataclass
 class Trial:
-    """One deed whose consequence is still to be seen: what was at stake before it, until when (s) it is looked for, and
-    the pose in the hand of what the deed is about to loosen."""
+    """One deed, the `number`-th that was told, whose consequence is still to be seen: what was at stake before it, until
+    when (s) it is looked for, and the pose in the hand of what the deed is about to loosen."""
 
+    number: int
     deed: Deed
     since: float
     before: Stake
     X_GO: SE3 | None
 
     @staticmethod
-    def of(deed: Deed, now: Occasion) -> "Trial":
+    def of(number: int, deed: Deed, now: Occasion) -> "Trial":
         """What has been done at that moment, and has not come about yet."""
-        return Trial(deed, now.t, Stake.of(now), _in_hand(deed, now) if deed.loosens else None)
+        return Trial(number, deed, now.t, Stake.of(now), _in_hand(deed, now) if deed.loosens else None)
 
     @property
     def until(self) -> float:

@@ -8,7 +8,7 @@ from zlib import crc32
 
 import numpy as np
 
-from bt_tamp.disturb.classes import KINDS, Kind
+from bt_tamp.disturb.classes import KINDS, Kind, Prospect
 from bt_tamp.disturb.consequence import Trial
 from bt_tamp.disturb.deed import Deed, Draw, Occasion
 from bt_tamp.disturb.names import CLASSES
@@ -69,6 +69,7 @@ class Driver:
     _plant: DisturbedPlant | None = field(default=None, init=False)
     _motion: MotionPlanner | None = field(default=None, init=False)
     _trials: list[Trial] = field(default_factory=list, init=False)
+    _told: int = field(default=0, init=False)
     _look_again: float = field(default=0.0, init=False)
     _struck: set[str] = field(default_factory=set, init=False)
 
@@ -127,6 +128,7 @@ class Driver:
         assert self._machine is not None
         agenda = self._machine.agenda
         left = {str(action) for action in agenda.left}
+        scenario = self._machine.context.scene.scenario
         for coming in self._coming:
             is_to_come = coming.spot is not None and coming.spot[0] in left
             if coming.kind is None or coming.due is not None or is_to_come:
@@ -134,12 +136,13 @@ class Driver:
             coming.spot = None
             kinds: dict[tuple[str, str], list[tuple[str, str]]] = {}
             refinements = agenda.refinements[len(agenda.refinements) - len(agenda.left) :]
-            for refinement in refinements:
+            for number, refinement in enumerate(refinements):
+                later = agenda.left[number:]
                 for phase in refinement.phases:
                     # Once the last thing is let go of, there is nothing left that could go wrong.
                     if refinement is refinements[-1] and phase.name == refinement.phases[-1].name:
                         break
-                    if coming.kind.fits(phase):
+                    if coming.kind.fits(Prospect(phase, later, scenario)):
                         spots = kinds.setdefault((refinement.action.name, phase.name), [])
                         spots.append((str(refinement.action), phase.name))
             if kinds:
@@ -175,7 +178,7 @@ class Driver:
         for trial in list(self._trials):
             is_proven = trial.is_proven(now)
             if is_proven:
-                self.report("mattered", since=trial.since)
+                self.report("mattered", number=trial.number)
             if is_proven or t > trial.until:
                 self._trials.remove(trial)
 
@@ -201,7 +204,7 @@ class Driver:
         assert self._plant is not None
         self._tell(coming.name, deed)
         if not deed.is_certain:
-            self._trials.append(Trial.of(deed, now))
+            self._trials.append(Trial.of(self._told - 1, deed, now))
             self._look_again = now.t + HAIR
         for fault in deed.faults:
             self._plant.suffer(fault)
@@ -214,6 +217,7 @@ class Driver:
         machine = self._machine
         assert machine is not None
         running, phase = machine.agenda.running, machine.context.phase
+        self._told += 1
         self.report(
             "disturbed",
             name=name,

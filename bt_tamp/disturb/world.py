@@ -158,7 +158,7 @@ def closes_on_nothing(now: Occasion) -> Deed | None:
 
 def sponge_far(now: Occasion) -> Deed | None:
     """The sponge is put at another end of the table."""
-    for name in now.tools():
+    for name in [name for name in now.tools() if name in _on_the_way(now)]:
         X_WO = now.truth.poses[name]
         rotation = _about_z(now.rng.uniform(0.0, np.pi)) @ now.scenario.bodies[name].X_WO.rotation
         spot = now.spot(now.scenario.bodies[name], rotation, X_WO.translation[:2], (0.25, 0.60))
@@ -169,7 +169,7 @@ def sponge_far(now: Occasion) -> Deed | None:
 
 def sponge_covered(now: Occasion, cover: str) -> Deed | None:
     """The late body `cover` is put on the sponge."""
-    for name in [name for name in now.tools() if name != now.held]:
+    for name in [name for name in now.tools() if name in _on_the_way(now)]:
         top = now.truth.poses[name]
         body = now.scenario.bodies[cover]
         z = height_above(now.scenario.bodies[name].shape, top.rotation) + depth_below(body.shape, np.eye(3)) + 1e-3
@@ -260,6 +260,11 @@ def _on_table(now: Occasion) -> list[str]:
             for region in regions
         )
     ]
+
+
+def _on_the_way(now: Occasion) -> set[str]:
+    """What is still to be taken up, and not in the hand."""
+    return {action.args[0] for action in now.left if action.name == "pick"} - {now.held}
 
 
 def _goal_bodies(now: Occasion) -> set[str]:

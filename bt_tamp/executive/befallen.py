@@ -39,7 +39,7 @@ class Ledger:
             case "disturbed":
                 self._found.append(_befallen(t, data))
             case "mattered":
-                self._found = [replace(one, mattered=one.mattered or one.t == data["since"]) for one in self._found]
+                self._found[data["number"]] = replace(self._found[data["number"]], mattered=True)
             case "action_started":
                 self._started = t
                 self._reacting.clear()

@@ -41,7 +41,7 @@ def test_a_deed_matters_once_its_consequence_was_seen():
     ledger = Ledger()
     disturbed(ledger, 1.0, mattered=False)
     disturbed(ledger, 2.0, mattered=False)
-    ledger.hear("mattered", 2.3, {"since": 2.0})
+    ledger.hear("mattered", 2.3, {"number": 1})
     assert [one.mattered for one in ledger.found] == [False, True]
 
 
