@@ -43,8 +43,8 @@ class Stake:
 
 @dataclass
 class Trial:
-    """One deed, the `number`-th that was told, whose consequence is still to be seen: what was at stake before it, until
-    when (s) it is looked for, and the pose in the hand of what the deed is about to loosen."""
+    """One deed, by its number among those told, whose consequence is still to be seen: what was at stake before it,
+    until when (s) it is looked for, and the pose in the hand of what the deed is about to loosen."""
 
     number: int
     deed: Deed
