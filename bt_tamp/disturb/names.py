@@ -25,7 +25,7 @@ CLASSES: dict[str, Declared] = {
     "slipping": Declared("what is held turns slippery for 1 s"),
     "sponge-far": Declared("the sponge is put at another end of the table"),
     "sponge-covered": Declared("a box is put on the sponge"),
-    "bin-shifted": Declared("a bin that is still needed is shifted by 3 to 7 cm"),
+    "bin-shifted": Declared("a bin that is still needed is shifted by a third of its width or more"),
     "crumbs-beside-pan": Declared("a crumb comes to lie on the table beside the dustpan's opening"),
     "goal-changed": Declared("something is wanted in another bin than before"),
     "push": Declared("100 N for 0.1 s somewhere on the arm"),

@@ -1,6 +1,7 @@
 """What is done to the world: each function draws one instance of its class for an occasion."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -10,7 +11,10 @@ from pinocchio import SE3
 
 from bt_tamp.disturb.deed import Deed, Later, Occasion
 from planner.task.symbols import Fact
+from scenarios.scenario import Region
 from scenarios.shapes import extents
+from scenarios.solids import body_solid, region_hull, table_solid
+from scenarios.standing import overlap_problem
 from sim.scene import depth_below, height_above
 from sim.world_faults import BinShifted, Brought, Moved, Slippery, TakenAway
 
@@ -18,6 +22,9 @@ T = TypeVar("T")
 
 NEAR = (0.04, 0.15)
 """Metres by which something is moved."""
+
+STRAY = 0.05
+"""Metres by which a shifted bin may come nearer to the robot or go further away."""
 
 AWAY = (2.0, 5.0)
 """Seconds for which something is gone."""
@@ -194,17 +201,26 @@ def sponge_out_of_reach(now: Occasion) -> Deed | None:
 
 
 def bin_shifted(now: Occasion) -> Deed | None:
-    """A bin that is still needed is shifted by some centimetres."""
+    """A bin that is still needed is shifted, so far that what was to be put into its middle would meet its wall or the
+    floor beside it, and not out of reach."""
     wanted = {arg for action in now.left for arg in action.args[1:]}
-    bins = [n for n, region in now.scenario.regions.items() if region.kind == "bin" and n in wanted]
+    places = regions_now(now)
+    bins = [name for name, region in places.items() if region.kind == "bin" and name in wanted]
+    base = now.scenario.robot.X_WB.translation[:2]
     for name in _shuffled(now, bins):
-        region, base = now.scenario.regions[name], now.scenario.robot.X_WB.translation
-        outward = region.X_WR.translation[:2] - base[:2]
-        outward = outward / np.linalg.norm(outward)
-        sideways = np.array([-outward[1], outward[0]]) * now.rng.choice([-1.0, 1.0])
-        x, y = 0.03 * outward * now.rng.uniform(0.0, 1.0) + sideways * now.rng.uniform(0.03, 0.06)
-        fault = BinShifted(start=now.t, region=name, by=(float(x), float(y), 0.0))
-        return Deed(f"{name} was shifted by {100 * np.hypot(x, y):.0f} cm", (fault,), names=(name,))
+        region = places[name]
+        p = region.X_WR.translation[:2]
+        others = [region_hull(other) for other in places.values() if other.name != name]
+        others += [table_solid(now.scenario.table), *(body_solid(one) for one in now.scenario.fixtures.values())]
+        for share in now.rng.uniform(0.35, 0.6, size=40):
+            angle = now.rng.uniform(0.0, 2.0 * np.pi)
+            by = share * min(region.size[:2]) * np.array([np.cos(angle), np.sin(angle)])
+            is_reached = abs(float(np.linalg.norm(p + by - base)) - float(np.linalg.norm(p - base))) < STRAY
+            shift = SE3(np.eye(3), np.array([*by, 0.0]))
+            if is_reached and overlap_problem(region_hull(region).moved(shift), others) is None:
+                fault = BinShifted(start=now.t, region=name, by=(float(by[0]), float(by[1]), 0.0))
+                said = f"{name} was shifted by {100 * np.hypot(*by):.0f} cm"
+                return Deed(said, (fault,), names=(name,))
     return None
 
 
@@ -239,6 +255,12 @@ def goal_changed(now: Occasion) -> Deed | None:
                 f"{fact.args[0]} is wanted in {other} instead of {fact.args[1]}", goal=wanted, names=(fact.args[0],)
             )
     return None
+
+
+def regions_now(now: Occasion) -> dict[str, Region]:
+    """The regions where they stand in truth."""
+    seen = now.truth.regions
+    return {n: replace(region, X_WR=seen.get(n, region.X_WR)) for n, region in now.scenario.regions.items()}
 
 
 def _put(now: Occasion, name: str, X_WO: SE3, sentence: str) -> Deed:
