@@ -69,6 +69,10 @@ COMPENSATED = 0.25
 COMPENSATION_RATE = 150.0
 """Nm/s at which that may change: joint friction turns round within 20 ms."""
 
+STOPPING, STOPPING_LADEN = 2.0, 1.3
+"""Times the acceleration of planned motions with which the arm may brake when it is told to hold, with nothing in the
+hand and with something, which must not slip."""
+
 YIELDING, YIELDING_DAMPING = 100.0, 30.0
 """1/s² and 1/s with which the arm holds after a collision: it gives way."""
 
@@ -307,7 +311,8 @@ class ArmController:
 
     def _begin_hold(self, state: ArmState) -> None:
         self._reference, self._hold_pending = None, False
-        self._course = Course.stop(state.q, state.v, self._robot.a_max)
+        haste = STOPPING if self._robot is self._unloaded else STOPPING_LADEN
+        self._course = Course.stop(state.q, state.v, haste * self._robot.a_max)
         self._law_changed = True
         self._pressed = False
 
