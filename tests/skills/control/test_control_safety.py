@@ -166,6 +166,17 @@ def test_ordinary_work_on_an_arm_with_friction_and_wrong_masses_is_no_collision(
     assert rig.controller.stopped is None
 
 
+def test_a_joint_that_rubs_with_3_nm_and_turns_round_is_no_collision(lab):
+    for joint in (2, 4, 6):
+        rig = lab.rig(lab.postures[1])
+        rig.plant.set_joint_friction(3.0 * np.eye(7)[joint])
+        rig.run(0.2)
+        way = 0.8 * np.eye(7)[joint] * np.sin(np.linspace(0.0, 2.0 * np.pi, 60))[:, None]
+        times = np.linspace(0.0, 4.0, 60)
+        rig.follow(Reference(Trajectory(times, rig.q + way, np.gradient(way, times, axis=0))))
+        assert rig.controller.stopped is None
+
+
 def test_a_wrist_sensor_that_falls_silent_while_pressing_stops_the_arm(lab):
     rig = lab.gripped_sponge(0.6, 0.0, 0.01)
     lower = lab.straight(rig.q, [0.0, 0.0, -0.02], 0.03)
