@@ -29,6 +29,12 @@ EDGE = 0.02
 WORKSPACE = (0.42, 0.78)
 """Metres from the robot's axis between which what is put down can be taken up again."""
 
+CAUGHT = 0.03
+"""Metres by which the middle of what falls must be inside the edge of what it falls on."""
+
+FALLS = 9
+"""Moments at which it is looked where something would fall."""
+
 DRAWS = 60
 
 
@@ -128,6 +134,23 @@ class Occasion:
         """Height of the table's top in W."""
         table = self.scenario.table
         return float(table.X_WT.translation[2]) + table.size[2] / 2
+
+    def falls_within_reach(self, seconds: float) -> bool:
+        """Would what is held, let go of now or within so many seconds, fall onto the table or into a region?"""
+        held, phase = self.scene.held, self.phase
+        if held is None:
+            return False
+        hands = [self.machine.robot.X_WG(self.truth.q)]
+        if phase is not None:
+            passed = self.machine.context.controller.time_in_reference
+            times = np.linspace(passed, passed + seconds, FALLS)
+            hands += [self.machine.robot.X_WG(phase.trajectory.at(float(t))[0]) for t in times]
+        return all(self._is_caught((X_WG * held.X_GO).translation) for X_WG in hands)
+
+    def _is_caught(self, p: np.ndarray) -> bool:
+        table = self.scenario.table
+        places = [(table.X_WT, table.size), *((region.X_WR, region.size) for region in self.scenario.regions.values())]
+        return any((np.abs(X_WS.actInv(p)[:2]) < np.array(size[:2]) / 2 - CAUGHT).all() for X_WS, size in places)
 
     def stands_free(self, body: Body, X_WO: SE3) -> bool:
         """Can a body be put at X_WO without overlapping anything, the arm and what it holds included?"""

@@ -10,6 +10,9 @@ from bt_tamp.disturb.world import moved
 from scenarios.names import Disordered
 from sim.robot_faults import Push, WeakGrip
 
+WEAK = 0.5
+"""Seconds for which the fingers are without force."""
+
 LINKS = ("link_3", "link_4", "link_5", "link_6", "link_7", None)
 
 
@@ -24,10 +27,10 @@ def push(now: Occasion) -> Deed:
 
 
 def weak_grip(now: Occasion) -> Deed | None:
-    """The fingers lose their force for half a second."""
-    if now.held is None:
+    """The fingers lose their force for half a second, over something that catches what is held."""
+    if now.held is None or not now.falls_within_reach(WEAK):
         return None
-    fault = WeakGrip(start=now.t, end=now.t + 0.5, force=0.5)
+    fault = WeakGrip(start=now.t, end=now.t + WEAK, force=0.5)
     return Deed("the gripper lost its force for 0.5 s", (fault,), names=(now.held,), loosens=True)
 
 

@@ -26,6 +26,9 @@ NEAR = (0.04, 0.15)
 STRAY = 0.05
 """Metres by which a shifted bin may come nearer to the robot or go further away."""
 
+SLIPPERY = 1.0
+"""Seconds for which something slips."""
+
 AWAY = (2.0, 5.0)
 """Seconds for which something is gone."""
 
@@ -144,11 +147,11 @@ def knocked_from_hand(now: Occasion) -> Deed | None:
 
 
 def slipping(now: Occasion) -> Deed | None:
-    """What is held turns slippery for a while."""
+    """What is held turns slippery for a while, over something that catches it."""
     name = now.held
-    if name is None:
+    if name is None or not now.falls_within_reach(SLIPPERY):
         return None
-    fault = Slippery(start=now.t, end=now.t + 1.0, name=name, friction=0.002)
+    fault = Slippery(start=now.t, end=now.t + SLIPPERY, name=name, friction=0.002)
     return Deed(f"{name} turned slippery in the hand for 1 s", (fault,), names=(name,), loosens=True)
 
 

@@ -76,12 +76,12 @@ class Collision:
 
 @dataclass(frozen=True)
 class SensorLost:
-    """The wrist sensor was silent for so many seconds while a force was to be kept."""
+    """The wrist sensor was silent, or frozen, for so many seconds while a force was to be kept."""
 
     silent: float
 
     def __str__(self) -> str:
-        return f"the wrist sensor has been silent for {self.silent * 1000:.0f} ms"
+        return f"the wrist sensor has told nothing new for {self.silent * 1000:.0f} ms"
 
 
 Stop = ForceTooHigh | TooFast | TorqueSpent | Collision | SensorLost

@@ -6,7 +6,7 @@ import pytest
 from planner.motion.trajectory import Trajectory
 from sim.disturbance import DisturbedPlant
 from sim.plant import Command
-from sim.sensor_faults import ForceDelay, ForceMissing, ForceNoise
+from sim.sensor_faults import ForceDelay, ForceFrozen, ForceMissing, ForceNoise
 from skills.control.controller import ArmController
 from skills.control.limits import FREE, ApproachLimit
 from skills.control.reference import Reference
@@ -189,6 +189,16 @@ def test_a_wrist_sensor_that_falls_silent_while_pressing_stops_the_arm(lab):
     assert np.all(np.isfinite(rig.tau))
     rig.run(0.3)
     assert np.abs(rig.plant.observe().v).max() < 0.02
+
+
+def test_a_wrist_sensor_that_is_frozen_while_contact_is_sought_stops_the_arm_before_it_presses_hard(lab):
+    rig = lab.gripped_sponge(0.6, 0.0, 0.02)
+    rig.plant = DisturbedPlant(rig.plant, [ForceFrozen(start=rig.plant.observe().t + 0.3)])
+    rig.controller.follow(
+        Reference(lab.straight(rig.q, [0.0, 0.0, -0.03], 0.03), "hybrid", force=10.0, until_contact=True)
+    )
+    assert max(rig.run(1.5, lambda _: rig.pressed_on_table("sponge"))) < 20.0
+    assert isinstance(rig.controller.stopped, SensorLost)
 
 
 def test_in_free_motion_a_silent_sensor_changes_nothing(lab):
