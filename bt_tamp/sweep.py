@@ -1,11 +1,14 @@
 """Whole runs in parallel processes. A run that crashes, or whose process is killed, costs none of the others."""
 
+import os
 import re
 import signal
+import time
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, replace
+from threading import Thread
 
 from joblib.externals.loky import ProcessPoolExecutor
 from joblib.externals.loky.process_executor import BrokenProcessPool
@@ -14,6 +17,9 @@ from bt_tamp.options import RunOptions
 
 MAX_TRIES = 2
 """How often a run is tried, at most, whose process vanishes."""
+
+PARENT_EVERY = 0.5
+"""Seconds between two looks of a worker at whether its parent still is."""
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Variables that keep a process's libraries to one thread."""
@@ -107,7 +113,20 @@ def run_job(job: Job) -> Finished:
 
 
 def _executor() -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(max_workers=1, env=dict.fromkeys(THREADS, "1"))
+    return ProcessPoolExecutor(
+        max_workers=1, env=dict.fromkeys(THREADS, "1"), initializer=_end_with, initargs=(os.getpid(),)
+    )
+
+
+def _end_with(parent: int) -> None:
+    """End this process soon after its parent, which may have been killed: it would wait for work for ever."""
+
+    def look() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_EVERY)
+        os._exit(1)
+
+    Thread(target=look, daemon=True).start()
 
 
 def _harvest(job: Job, future: Future) -> Finished:

@@ -7,8 +7,8 @@ from pathlib import Path
 from bt_tamp.sweep_results import Line, Run, scene_name
 
 RUN_COLUMNS = (
-    "scene seed disturb replan outcome succeeded robot_s replans peak_contact_force_n disturbance phase answer "
-    "answered_after_s reason command"
+    "scene seed disturb replan outcome met succeeded robot_s replans peak_force_n disturbance action phase mattered "
+    "answer answered_after_s reacted_after_s reason command"
 ).split()
 
 
@@ -31,9 +31,10 @@ def write_csv(folder: Path, runs: Sequence[Run], lines: Sequence[Line]) -> list[
 def _row(run: Run) -> list[object]:
     result = run.result
     first = result.disturbances[0] if result is not None and result.disturbances else None
-    figures = [None] * 3 if result is None else [result.robot_s, result.replans, result.peak_contact_force_n]
-    told = [None] * 4 if first is None else [first.sentence, first.phase, first.answer, first.answered_after_s]
-    known = [run.scene, run.seed, run.disturb, run.replan, run.outcome, run.succeeded]
+    figures = [None] * 3 if result is None else [result.robot_s, result.replans, result.peak_force_n]
+    names = ("sentence", "action", "phase", "mattered", "answer", "answered_after_s", "reacted_after_s")
+    told = [None if first is None else getattr(first, name) for name in names]
+    known = [run.scene, run.seed, run.disturb, run.replan, run.outcome, run.is_met, run.succeeded]
     return [*known, *figures, *told, run.reason, run.command]
 
 
@@ -51,7 +52,7 @@ def plot(folder: Path, lines: Sequence[Line]) -> list[Path]:
         figure, (left, right) = plt.subplots(1, 2, figsize=(11, 1.5 + 0.28 * len(names)), sharey=True)
         for replan, colour, shift in ((True, "C0", 0.15), (False, "C3", -0.15)):
             for line in (line for line in mine if line.replan == replan):
-                y, rate = names.index(line.disturb) + shift, line.succeeded / line.runs
+                y, rate = names.index(line.disturb) + shift, line.succeeded / max(line.runs, 1)
                 low, high = line.interval
                 left.plot([low, high], [y, y], color=colour, linewidth=1.5)
                 left.plot([rate], [y], "o", color=colour, markersize=4)

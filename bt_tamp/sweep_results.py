@@ -18,6 +18,9 @@ Z95 = 1.959964
 
 UNDISTURBED = "none"
 
+WITHOUT_A_PLAN = ("refined_again", "rebuilt")
+"""Answers that take no new task plan."""
+
 RIGHT_VERDICTS = ("proven_infeasible", "no_plan")
 """How a run should end whose goal can't be reached."""
 
@@ -43,22 +46,28 @@ class Run:
         return self.disturb == UNDISTURBED or all(CLASSES[name].is_reachable for name in self.disturb.split(","))
 
     @property
-    def was_disturbed(self) -> bool:
-        """Did anything befall it? What is software's failing befalls every run."""
-        return self.result is not None and bool(self.result.disturbances)
+    def is_met(self) -> bool:
+        """Did what was to befall it befall it, and matter? A run that broke before it could tell counts as one."""
+        if self.disturb == UNDISTURBED or self.result is None:
+            return True
+        return any(one.mattered for one in self.result.disturbances)
 
     @property
     def succeeded(self) -> bool:
-        if self.is_reachable or not self.was_disturbed:
+        if self.is_reachable or not self.is_met:
             return self.outcome == "goal_reached"
         return self.outcome in RIGHT_VERDICTS
 
 
 @dataclass(frozen=True)
 class Line:
-    """The runs of one scene and class. interval: 95 % of the success rate, by Wilson. lost_s: median of robot time
-    beyond that of the undisturbed run of the same scene and seed, both having succeeded. answered_s: median time from
-    a disturbance to the first answer without a new plan. unmet: runs that nothing befell."""
+    """The runs of one scene and class: `runs` and everything else are of those that were met, `unmet` counts the rest.
+
+    interval: 95 % of the success rate, by Wilson. lost_s: median of robot time beyond that of the undisturbed run of
+    the same scene and seed, both having succeeded; lost_actions: the same as a multiple of the action that was undone.
+    reacted_s, slow_reacted_s: median and 95 % of the time until an action that was disturbed stood still or set out
+    anew, where that took no new plan; reactions: how many. peak_n: the largest true force. violations: torques beyond
+    their limit or NaN."""
 
     scene: str
     disturb: str
@@ -68,9 +77,12 @@ class Line:
     interval: tuple[float, float]
     replans: float | None
     lost_s: float | None
-    answered_s: float | None
+    lost_actions: float | None
+    reacted_s: float | None
+    slow_reacted_s: float | None
+    reactions: int
     peak_n: float | None
-    torque_violations: int
+    violations: int
     crashes: int
     unmet: int
     reasons: tuple[tuple[str, int], ...]
@@ -143,33 +155,71 @@ def lines(runs: Sequence[Run]) -> list[Line]:
 
 
 def _line(key: tuple[str, str, bool], runs: Sequence[Run], usual: Mapping[tuple, Run]) -> Line:
-    results = [run.result for run in runs if run.result is not None]
-    succeeded = sum(run.succeeded for run in runs)
-    lost = []
-    for run in runs:
+    met = [run for run in runs if run.is_met]
+    results = [run.result for run in met if run.result is not None]
+    succeeded = sum(run.succeeded for run in met)
+    lost, shares = [], []
+    for run in met:
         plain = usual.get((run.scene, run.seed, run.options, run.replan))
         if run.succeeded and run.is_reachable and plain is not None and run.result and plain.result:
             lost.append(run.result.robot_s - plain.result.robot_s)
-    answers = [
-        one.answered_after_s
-        for result in results
-        for one in result.disturbances
-        if one.answer in ("refined_again", "rebuilt") and one.phase != "planning" and one.answered_after_s is not None
-    ]
-    failed = Counter(_why(run) for run in runs if not run.succeeded)
+            undone = undone_s(run.result, plain.result)
+            shares += [lost[-1] / undone] if undone else []
+    reactions = reactions_of(results)
+    failed = Counter(_why(run) for run in met if not run.succeeded)
     return Line(
         *key,
-        runs=len(runs),
+        runs=len(met),
         succeeded=succeeded,
-        interval=wilson(succeeded, len(runs)),
+        interval=wilson(succeeded, len(met)),
         replans=_median([result.replans for result in results]),
         lost_s=_median(lost),
-        answered_s=_median(answers),
-        peak_n=max((result.peak_contact_force_n for result in results), default=None),
-        torque_violations=sum(result.torque_limit_violations for result in results),
-        crashes=sum(run.outcome in ("crashed", "killed") for run in runs),
-        unmet=0 if key[1] == UNDISTURBED else sum(not run.was_disturbed for run in runs),
+        lost_actions=_median(shares),
+        reacted_s=_median(reactions),
+        slow_reacted_s=at_95(reactions),
+        reactions=len(reactions),
+        peak_n=max((max(result.peak_force_n, result.peak_contact_force_n) for result in results), default=None),
+        violations=sum(result.torque_limit_violations + result.unlawful_commands for result in results),
+        crashes=sum(run.outcome in ("crashed", "killed") for run in met),
+        unmet=len(runs) - len(met),
         reasons=tuple(failed.most_common()),
+    )
+
+
+def reactions_of(results: Iterable[RunResult]) -> list[float]:
+    """Seconds until an action that was disturbed stood still or set out anew, where that took no new task plan."""
+    return [
+        one.reacted_after_s
+        for result in results
+        for one in result.disturbances
+        if one.answer in WITHOUT_A_PLAN and one.reacted_after_s is not None
+    ]
+
+
+def undone_s(disturbed: RunResult, plain: RunResult) -> float | None:
+    """How long the action took, in the undisturbed run, that the first disturbance undid: the one that was running, if
+    it was about the same body, else the first that was. None if there was no such action."""
+    told = [one for one in disturbed.disturbances if one.bodies]
+    if not told or len(plain.executed) != len(plain.executed_s):
+        return None
+    took = dict(zip(reversed(plain.executed), reversed(plain.executed_s), strict=True))
+    name, running = told[0].bodies[0], told[0].action
+    about = [action for action in plain.executed if name in action.partition("(")[2].rstrip(")").split(", ")]
+    return took.get(running if running in about else next(iter(about), ""))
+
+
+def at_95(values: Sequence[float]) -> float | None:
+    """The value that 95 % do not exceed."""
+    return sorted(values)[math.ceil(0.95 * len(values)) - 1] if values else None
+
+
+def hits(runs: Iterable[Run]) -> Counter[str]:
+    """How often each phase of each skill was disturbed, and planning."""
+    return Counter(
+        "planning" if one.phase == "planning" else f"{one.action.partition('(')[0]} {one.phase}".strip()
+        for run in runs
+        if run.result is not None and run.disturb != UNDISTURBED
+        for one in run.result.disturbances
     )
 
 

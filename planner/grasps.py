@@ -89,14 +89,15 @@ def grasps(shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.
 def tool_grasps(
     shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.random.Generator
 ) -> Iterator[Grasp]:
-    """Grasps that leave a wiping tool's base and long faces free: from above, by the ends of its longest level axis."""
+    """Grasps that leave a wiping tool's base and two of its sides free, from above: by the ends of its longest level
+    axis, for the widest front; then, where something stands at an end, by those of the other."""
     level = np.argsort(np.abs(X_WO.rotation[2]))[:2]
-    longest = int(max(level, key=lambda axis: extents(shape)[axis]))
-    for grasp in grasps(shape, X_WO, gripper, base, rng):
-        closing = grasp.X_OG.rotation[:, 1]
-        approach_W = X_WO.rotation @ grasp.X_OG.rotation[:, 2]
-        if abs(closing[longest]) > 0.99 and approach_W[2] < -0.99:
-            yield grasp
+    for axis in sorted(level.tolist(), key=lambda axis: -extents(shape)[axis]):
+        for grasp in grasps(shape, X_WO, gripper, base, rng):
+            closing = grasp.X_OG.rotation[:, 1]
+            approach_W = X_WO.rotation @ grasp.X_OG.rotation[:, 2]
+            if abs(closing[axis]) > 0.99 and approach_W[2] < -0.99:
+                yield grasp
 
 
 def _levelling(shape: Shape, R_WO: np.ndarray) -> np.ndarray:

@@ -46,7 +46,12 @@ class Backdrop:
     @staticmethod
     def of(scenario: Scenario, width: int = WIDTH, height: int = HEIGHT, foot: float = 0.0) -> "Backdrop":
         """Render a scene's room at twice the size. `foot`: part of the height kept free at the bottom."""
-        camera, light = overview(scenario, width, height, foot), overlook(scenario)
+        return Backdrop.seen(scenario, overview(scenario, width, height, foot), overlook(scenario))
+
+    @staticmethod
+    def seen(scenario: Scenario, camera: Camera, light: Camera) -> "Backdrop":
+        """The same as `camera` sees it, and the light."""
+        width, height = camera.width, camera.height
         with Stage("tiny") as room:
             add_room(room, scenario)
             fine = room.look(twice(camera))[0].astype(np.uint16).reshape(height, 2, width, 2, 3)

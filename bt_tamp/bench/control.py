@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from statistics import fmean
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -12,7 +13,7 @@ from rich.table import Table
 
 from bt_tamp.bench.checks import Check, at_least, at_most
 from bt_tamp.bench.stopwatch import Stopwatch
-from bt_tamp.executive.build import CONTROL_EVERY, Machine, build
+from bt_tamp.executive.build import CONTROL_EVERY, TREE_EVERY, Machine, build
 from bt_tamp.executive.loop import Audits, Tally, act, look
 from bt_tamp.options import RunOptions
 from bt_tamp.report.folder import RunFolder
@@ -45,18 +46,24 @@ ENOUGH = 3.0
 class Cost:
     """One regime, "free" or "wiping". Per control tick, in microseconds of CPU time: the mean of each part, and the
     median of building and solving the QP. real_time: simulated seconds by seconds of CPU, everything included but
-    planning, in the ticks whose parts are not timed."""
+    planning, in the ticks whose parts are not timed. nodes: how many the tree had, on average."""
 
     regime: str
     seconds: float
     parts: dict[str, float]
     qp_median: float
     real_time: float
+    nodes: float
 
     @property
     def control(self) -> float:
         """Control and tree, µs a tick."""
         return sum(self.parts[part] for part in (*CONTROL_PARTS, "tree"))
+
+    @property
+    def tree_tick(self) -> float:
+        """Belief, tree and monitoring, µs a tick of the tree."""
+        return TREE_EVERY * self.parts["tree"]
 
     @property
     def physics(self) -> float:
@@ -99,11 +106,14 @@ def run(seed: int) -> Run:
     watches = {regime: Stopwatch(longest=THINKING) for regime in ("free", "wiping", "")}
     lapped = dict.fromkeys(watches, 0)
     spent = {regime: [0.0, 0.0] for regime in watches}
+    nodes: dict[str, list[int]] = {regime: [] for regime in watches}
     n = 0
     with TemporaryDirectory() as folder, RunRecorder(scenario, RunFolder(Path(folder))) as recorder:
         while tally.t < LONGEST and min(spent[r][0] for r in ("free", "wiping")) < ENOUGH:
             regime, is_lapped = _regime(machine), n // LAPPED % 2 == 0
             watch = watches[regime]
+            if n % LAPPED == 0:
+                nodes[regime].append(sum(1 for _ in machine.mission.root.iterate()))
             machine.plant.lap = machine.context.controller.lap = watch.lap if is_lapped else _ignore
             before = time.thread_time()
             watch.start()
@@ -119,7 +129,10 @@ def run(seed: int) -> Run:
     machine.plant.close()
     if not spent["wiping"][0]:
         raise ValueError(f"{SCENE}, seed {seed}: no stroke within {LONGEST:g} simulated seconds")
-    return [_cost(regime, watches[regime], lapped[regime], *spent[regime]) for regime in ("free", "wiping")]
+    return [
+        _cost(regime, watches[regime], lapped[regime], (spent[regime][0], spent[regime][1]), fmean(nodes[regime]))
+        for regime in ("free", "wiping")
+    ]
 
 
 def _regime(machine: Machine) -> str:
@@ -130,10 +143,11 @@ def _regime(machine: Machine) -> str:
     return "wiping" if phase.kind in WIPING else "free" if phase.kind in FREE else ""
 
 
-def _cost(regime: str, watch: Stopwatch, ticks: int, simulated: float, real: float) -> Cost:
+def _cost(regime: str, watch: Stopwatch, ticks: int, spent: tuple[float, float], nodes: float) -> Cost:
     parts = {part: 1e6 * watch.total(part) / ticks for part in PARTS}
     qp = watch.median("QP build") + watch.median("solve")
-    return Cost(regime, simulated, parts, qp, simulated / real)
+    simulated, real = spent
+    return Cost(regime, simulated, parts, qp, simulated / real, nodes)
 
 
 def middle(runs: Sequence[Run]) -> list[Cost]:
@@ -150,7 +164,13 @@ def acceptance(runs: Sequence[Run]) -> list[Check]:
         at_most("wiping: control and tree, as a share of the bare physics", shares, 1.0, "times"),
         at_least("wiping: real-time factor", [cost.real_time for cost in wiping], 3.0, "times"),
         at_most("wiping: QP, build and solve, median", [cost.qp_median for cost in wiping], 120.0, "µs"),
+        at_most("tree and monitoring, a tick at 100 nodes", [_at_100_nodes(cost) for cost in middle(runs)], 1e3, "µs"),
     ]
+
+
+def _at_100_nodes(cost: Cost) -> float:
+    """µs that a tick of the tree would cost with 100 nodes, in proportion."""
+    return cost.tree_tick * 100.0 / cost.nodes
 
 
 def print_results(console: Console, runs: Sequence[Run]) -> None:
@@ -168,6 +188,8 @@ def print_results(console: Console, runs: Sequence[Run]) -> None:
     table.add_section()
     table.add_row("control and tree", *(f"{cost.control:.0f}" for cost in costs))
     table.add_row("bare physics", *(f"{cost.physics:.0f}" for cost in costs))
+    table.add_row("a tick of the tree", *(f"{cost.tree_tick:.0f}" for cost in costs))
+    table.add_row("its nodes", *(f"{cost.nodes:.0f}" for cost in costs))
     table.add_row("QP, median", *(f"{cost.qp_median:.0f}" for cost in costs))
     table.add_row("real-time factor", *(f"{cost.real_time:.2f}" for cost in costs))
     console.print(table)

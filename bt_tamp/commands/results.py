@@ -1,17 +1,24 @@
 """Sum up what sweeps have stored, by scene and class of disturbance; plots and CSV with --out.
 
 success: goal reached, or the right verdict where the class declares that it can't be; with its 95 % interval (Wilson).
-lost s: robot time beyond the undisturbed run of the same scene and seed. answer s: from a disturbance to the first
-answer without a new plan. unmet: runs that ended before anything befell them.
+Runs that ended before anything that matters befell them are no success: they are left out, and counted as unmet.
+lost s: robot time beyond the undisturbed run of the same scene and seed, median; × action: as a multiple of the action
+that was undone. react s: from a disturbance of the running action until the arm stood still or set out anew, thinking
+included, where that took no new task plan: median / 95 %. peak N: the largest true force. broken: torques beyond their
+limit, or NaN.
 """
 
 import argparse
 import sys
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from bt_tamp.sweep_results import Line, Run
+
+
+WIDTH = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,17 +47,21 @@ def call(arguments: argparse.Namespace) -> int:
 
 
 def _print(found: "list[Line]", runs: "list[Run]") -> None:
+    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    from bt_tamp.sweep_results import scene_name
+    from bt_tamp.report.sentences import counted
+    from bt_tamp.sweep_results import at_95, hits, reactions_of, scene_name
 
     console = Console()
-    table = Table(pad_edge=False)
-    table.add_column("scene")
+    if not console.is_terminal:  # Lines of a file need not fit a window.
+        console = Console(width=WIDTH)
+    table = Table(pad_edge=False, box=SIMPLE_HEAD)
+    table.add_column("scene", no_wrap=True)
     table.add_column("class", no_wrap=True)
-    for heading in ("success", "95 %", "replans", "lost s", "answer s", "peak N", "unmet"):
+    for heading in ("success", "95 %", "replans", "lost s", "× action", "react s", "peak N", "broken", "unmet"):
         table.add_column(heading, justify="right")
     for line in found:
         low, high = line.interval
@@ -59,11 +70,21 @@ def _print(found: "list[Line]", runs: "list[Run]") -> None:
             line.disturb + ("" if line.replan else ", open loop"),
             f"{line.succeeded}/{line.runs}",
             f"{100 * low:.0f}–{100 * high:.0f}",
-            *(_shown(value) for value in (line.replans, line.lost_s, line.answered_s, line.peak_n)),
-            str(line.unmet) if line.unmet else "",
+            *(_shown(value) for value in (line.replans, line.lost_s, line.lost_actions)),
+            "–" if line.reacted_s is None else f"{line.reacted_s:.2f} / {line.slow_reacted_s:.2f}",
+            _shown(line.peak_n),
+            str(line.violations or ""),
+            str(line.unmet or ""),
         )
     console.print(table)
-    for run in (run for run in runs if not run.succeeded):
+    reactions = reactions_of(run.result for run in runs if run.result is not None and run.replan)
+    if reactions:
+        told = f"{counted(len(reactions), 'reaction')}: median {median(reactions):.2f} s, 95 % {at_95(reactions):.2f} s"
+        console.print(told, highlight=False)
+    struck = hits(runs)
+    if struck:
+        console.print(Text("phases hit: " + ", ".join(f"{what} {n}" for what, n in struck.most_common())))
+    for run in (run for run in runs if run.is_met and not run.succeeded):
         said = f"{run.outcome.replace('_', ' ')}{': ' if run.reason else ''}{run.reason}"
         console.print(Text(f"{run.command}\n    {said}"), soft_wrap=True)
 

@@ -9,48 +9,85 @@ from pinocchio import SE3
 
 from bt_tamp.disturb import robot, world
 from bt_tamp.disturb.deed import Draw
+from bt_tamp.disturb.disorders import disordered
 from bt_tamp.disturb.faulty import ExhaustedMotionPlanner, FailingSolver, FailingTaskPlanner
 from bt_tamp.disturb.names import CLASSES
+from bt_tamp.disturb.robot import moved_unseen
 from bt_tamp.executive.seams import Seams
 from planner.refinement import Phase
+from planner.task.symbols import GroundAction
 from scenarios.goal import goal_text, parse_goal
 from scenarios.scenario import Body, Scenario
 from scenarios.shapes import Box
+from sim.disturbance import FOREVER
 
-Fits = Callable[[Phase], bool]
+
+@dataclass(frozen=True)
+class Prospect:
+    """A phase that is to come, the actions from its own on, and the scene."""
+
+    phase: Phase
+    later: tuple[GroundAction, ...]
+    scenario: Scenario
+
+
+Fits = Callable[[Prospect], bool]
 """May it come during such a phase?"""
+
+Strike = Callable[[], None]
+"""Told by software that fails, when it does."""
 
 Amend = Callable[[Scenario], Scenario]
 """The scene with what will come late."""
 
+SPELLS = 12
+"""How often the controller's solver fails for a while."""
+
 STRAY, CRUMB, POST = "stray_box", "stray_crumb", "stray_post"
 
 
-def _always(phase: Phase) -> bool:
+def _always(to_come: Prospect) -> bool:
     return True
 
 
-def _holding(phase: Phase) -> bool:
-    return phase.held is not None and phase.kind not in ("open",)
+def _holding(to_come: Prospect) -> bool:
+    return to_come.phase.held is not None and to_come.phase.kind != "open"
 
 
-def _moving(phase: Phase) -> bool:
-    return phase.kind in ("move", "approach", "slide")
+def _moving(to_come: Prospect) -> bool:
+    return to_come.phase.kind in ("move", "approach", "slide")
 
 
-def _before_grasp(phase: Phase) -> bool:
+def _before_grasp(to_come: Prospect) -> bool:
+    phase = to_come.phase
     return phase.kind == "approach" and phase.held is None and phase.name == "approach"
 
 
-def _stroking(phase: Phase) -> bool:
-    return phase.kind == "slide"
+def _driven(to_come: Prospect) -> bool:
+    return to_come.phase.kind not in ("open", "close")
+
+
+def _feeling(to_come: Prospect) -> bool:
+    phase = to_come.phase
+    return phase.kind in ("touch", "slide") or (phase.held is not None and phase.kind == "move")
+
+
+def _stroking(to_come: Prospect) -> bool:
+    return to_come.phase.kind == "slide"
+
+
+def _before_tool(to_come: Prospect) -> bool:
+    """Is a tool still to be taken up?"""
+    picked = [action.args[0] for action in to_come.later if action.name == "pick"]
+    is_taken = to_come.phase.kind in ("open", "close") or to_come.phase.held is not None
+    return any(to_come.scenario.bodies[name].tool for name in picked[1 if is_taken else 0 :])
 
 
 def _unchanged(scenario: Scenario) -> Scenario:
     return scenario
 
 
-def _real(rng: np.random.Generator) -> Seams:
+def _real(rng: np.random.Generator, strike: Strike) -> Seams:
     return Seams()
 
 
@@ -63,7 +100,7 @@ class Kind:
     fits: Fits = _always
     while_planning: bool = True
     amend: Amend = _unchanged
-    seams: Callable[[np.random.Generator], Seams] = field(default=_real)
+    seams: Callable[[np.random.Generator, Strike], Seams] = field(default=_real)
 
 
 def with_late(body: Body, to: str | None, scenario: Scenario) -> Scenario:
@@ -87,10 +124,18 @@ _CRUMB = _box(CRUMB, (0.024, 0.024, 0.024), 0.012)
 _POST = _box(POST, (0.05, 0.05, 0.22), 0.3)
 
 
-def _failing_solver(status: str, rng: np.random.Generator) -> Seams:
-    """40 ms without a solution, time and again."""
-    spells = tuple((int(first), 20) for first in rng.integers(200, 25_000, size=12))
-    return Seams(solver=FailingSolver(status, spells))
+def _failing_solver(status: str, rng: np.random.Generator, strike: Strike) -> Seams:
+    """40 ms without a solution, every few seconds."""
+    first = np.cumsum(rng.integers(300, 2000, size=SPELLS))
+    return Seams(solver=FailingSolver(status, tuple((start, 20) for start in first.tolist()), strike))
+
+
+def _exhausted_motion_planner(rng: np.random.Generator, strike: Strike) -> Seams:
+    return Seams(motion=partial(ExhaustedMotionPlanner, strike=strike))
+
+
+def _failing_task_planner(rng: np.random.Generator, strike: Strike) -> Seams:
+    return Seams(task_planner=partial(FailingTaskPlanner, strike=strike))
 
 
 KINDS: dict[str, Kind] = {
@@ -104,27 +149,29 @@ KINDS: dict[str, Kind] = {
     "stroke-blocked": Kind(partial(world.path_blocked, name=POST), _stroking, False, partial(with_late, _POST, None)),
     "knocked-from-hand": Kind(world.knocked_from_hand, _holding, False),
     "slipping": Kind(world.slipping, _holding, False),
-    "sponge-far": Kind(world.sponge_far),
-    "sponge-covered": Kind(partial(world.sponge_covered, cover=STRAY), amend=partial(with_late, _STRAY, None)),
+    "sponge-far": Kind(world.sponge_far, _before_tool),
+    "sponge-covered": Kind(
+        partial(world.sponge_covered, cover=STRAY), _before_tool, amend=partial(with_late, _STRAY, None)
+    ),
     "bin-shifted": Kind(world.bin_shifted),
     "crumbs-beside-pan": Kind(world.crumbs_beside_pan),
     "goal-changed": Kind(world.goal_changed),
     "push": Kind(robot.push),
     "closes-on-nothing": Kind(world.closes_on_nothing, _before_grasp, False),
     "weak-grip": Kind(robot.weak_grip, _holding, False),
-    "force-bias": Kind(robot.force_bias),
-    "force-noise": Kind(robot.force_noise),
-    "force-missing": Kind(robot.force_missing),
-    "force-frozen": Kind(robot.force_frozen),
-    "joint-delay": Kind(robot.joint_delay),
-    "joint-friction": Kind(robot.joint_friction),
-    "pose-noise": Kind(robot.pose_noise),
-    "pose-delay": Kind(robot.pose_delay),
-    "pose-missing": Kind(robot.pose_missing),
+    "force-bias": Kind(partial(disordered, what="force-bias", size=6.0), _feeling, False),
+    "force-noise": Kind(partial(disordered, what="force-noise", size=0.5), _feeling, False),
+    "force-missing": Kind(partial(disordered, what="force-missing", seconds=1.0), _feeling, False),
+    "force-frozen": Kind(partial(disordered, what="force-frozen", seconds=1.0), _feeling, False),
+    "joint-delay": Kind(partial(disordered, what="joint-delay", size=0.01, seconds=2.0), _driven, False),
+    "joint-friction": Kind(partial(disordered, what="joint-friction", size=3.0)),
+    "pose-noise": Kind(partial(disordered, what="pose-noise", size=0.005)),
+    "pose-delay": Kind(partial(moved_unseen, what="pose-delay", size=0.3, seconds=FOREVER, within=(0.5, 2.0))),
+    "pose-missing": Kind(partial(moved_unseen, what="pose-missing", size=0.0, seconds=1.0, within=(0.2, 0.8))),
     "qp-infeasible": Kind(seams=partial(_failing_solver, "primal infeasible")),
     "qp-iterations": Kind(seams=partial(_failing_solver, "maximum iterations reached")),
-    "motion-budget": Kind(seams=lambda rng: Seams(motion=ExhaustedMotionPlanner)),
-    "task-planner": Kind(seams=lambda rng: Seams(task_planner=FailingTaskPlanner)),
+    "motion-budget": Kind(seams=_exhausted_motion_planner),
+    "task-planner": Kind(seams=_failing_task_planner),
     "taken-for-good": Kind(world.taken_for_good),
     "sponge-out-of-reach": Kind(world.sponge_out_of_reach),
 }

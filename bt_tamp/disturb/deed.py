@@ -11,6 +11,7 @@ from planner.motion.motion_planner import MotionPlanner
 from planner.refinement import Phase
 from planner.task.symbols import Fact, GroundAction
 from scenarios.checks import immovable
+from scenarios.goal import is_crumb
 from scenarios.scenario import Body, Scenario
 from scenarios.shapes import bounding_radius
 from scenarios.solids import body_solid
@@ -28,6 +29,12 @@ EDGE = 0.02
 WORKSPACE = (0.42, 0.78)
 """Metres from the robot's axis between which what is put down can be taken up again."""
 
+CAUGHT = 0.03
+"""Metres by which the middle of what falls must be inside the edge of what it falls on."""
+
+FALLS = 9
+"""Moments at which it is looked where something would fall."""
+
 DRAWS = 60
 
 
@@ -42,13 +49,18 @@ class Later:
 @dataclass(frozen=True)
 class Deed:
     """What is done: a sentence in the past tense for the story, faults for the plant, what is wanted from now on (None:
-    as before), and what follows. names: the bodies concerned."""
+    as before), and what follows. names: the bodies and regions concerned. is_certain: it matters whatever comes of it,
+    as its draw made sure (else it must be seen to have changed something). is_in_the_way: of the running motion.
+    loosens: what is named first may part from the hand."""
 
     sentence: str
     faults: tuple[Fault, ...] = ()
     goal: frozenset[Fact] | None = None
     later: Later | None = None
     names: tuple[str, ...] = ()
+    is_certain: bool = False
+    is_in_the_way: bool = False
+    loosens: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,10 +112,45 @@ class Occasion:
         names = dict.fromkeys([*(action.args[0] for action in self.left), *wanted])
         return [name for name in names if name in self.truth.poses and name != self.held]
 
+    def lacking(self) -> list[str]:
+        """Bodies that are there, not in the hand, and that the goal still lacks."""
+        agenda = self.machine.agenda
+        missing = agenda.goal - agenda.facts(self.machine.context.scene)
+        names = sorted({fact.args[0] for fact in missing if fact.args})
+        return [name for name in names if name in self.truth.poses and name != self.held]
+
+    def is_crumb(self, name: str) -> bool:
+        """Is a body a crumb?"""
+        return is_crumb(self.scenario.bodies[name], self.scenario.robot.model)
+
+    def tools(self) -> list[str]:
+        """Sponges that are there and still needed."""
+        bodies = self.scenario.bodies
+        needed = {arg for action in self.left for arg in action.args} | set(self.lacking())
+        wipes = any(self.is_crumb(name) for name in self.lacking())
+        return [name for name in self.truth.poses if bodies[name].tool == "sponge" and (wipes or name in needed)]
+
     def table_height(self) -> float:
         """Height of the table's top in W."""
         table = self.scenario.table
         return float(table.X_WT.translation[2]) + table.size[2] / 2
+
+    def falls_within_reach(self, seconds: float) -> bool:
+        """Would what is held, let go of now or within so many seconds, fall onto the table or into a region?"""
+        held, phase = self.scene.held, self.phase
+        if held is None:
+            return False
+        hands = [self.machine.robot.X_WG(self.truth.q)]
+        if phase is not None:
+            passed = self.machine.context.controller.time_in_reference
+            times = np.linspace(passed, passed + seconds, FALLS)
+            hands += [self.machine.robot.X_WG(phase.trajectory.at(float(t))[0]) for t in times]
+        return all(self._is_caught((X_WG * held.X_GO).translation) for X_WG in hands)
+
+    def _is_caught(self, p: np.ndarray) -> bool:
+        table = self.scenario.table
+        places = [(table.X_WT, table.size), *((region.X_WR, region.size) for region in self.scenario.regions.values())]
+        return any((np.abs(X_WS.actInv(p)[:2]) < np.array(size[:2]) / 2 - CAUGHT).all() for X_WS, size in places)
 
     def stands_free(self, body: Body, X_WO: SE3) -> bool:
         """Can a body be put at X_WO without overlapping anything, the arm and what it holds included?"""

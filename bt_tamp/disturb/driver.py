@@ -3,11 +3,13 @@ plant sees it."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from zlib import crc32
 
 import numpy as np
 
-from bt_tamp.disturb.classes import KINDS, Kind
+from bt_tamp.disturb.classes import KINDS, Kind, Prospect
+from bt_tamp.disturb.consequence import Trial
 from bt_tamp.disturb.deed import Deed, Draw, Occasion
 from bt_tamp.disturb.names import CLASSES
 from bt_tamp.disturb.scheduled import drawing
@@ -16,13 +18,17 @@ from bt_tamp.executive.seams import REAL, Seams
 from planner.motion.motion_planner import MotionPlanner
 from scenarios.disturbance import Disturbance, Moment
 from sim.bullet import BulletPlant
-from sim.disturbance import DisturbedPlant
+from sim.disturbance import HAIR, DisturbedPlant
+from sim.world_faults import BinShifted
 
 WHILE_PLANNING = 0.1
 """Share of the instances that fall into the first planning."""
 
 AGAIN = 0.1
 """Seconds after which an instance for which there was nothing to do is tried again."""
+
+LOOK_EVERY = 0.02
+"""Seconds between two looks for the consequences of what was done."""
 
 PATIENCE = 600
 """How often at most."""
@@ -62,7 +68,10 @@ class Driver:
     _machine: Machine | None = field(default=None, init=False)
     _plant: DisturbedPlant | None = field(default=None, init=False)
     _motion: MotionPlanner | None = field(default=None, init=False)
-    _is_planned: bool = field(default=False, init=False)
+    _trials: list[Trial] = field(default_factory=list, init=False)
+    _told: int = field(default=0, init=False)
+    _look_again: float = field(default=0.0, init=False)
+    _struck: set[str] = field(default_factory=set, init=False)
 
     def __post_init__(self) -> None:
         for number, one in enumerate(self.declared):
@@ -82,7 +91,7 @@ class Driver:
         """What this run is wired with."""
         found = Seams(plant=self._wrapped)
         for name in self.classes:
-            given = vars(KINDS[name].seams(self._stream(name)))
+            given = vars(KINDS[name].seams(self._stream(name), partial(self._strike, name)))
             found = replace(found, **{key: part for key, part in given.items() if part is not getattr(REAL, key)})
         return found
 
@@ -93,11 +102,7 @@ class Driver:
 
     def hear(self, kind: str, t: float, phase: str = "", action: str = "") -> None:
         """Something happened in the run."""
-        if kind == "run_started":
-            for name in (name for name in self.classes if KINDS[name].draw is None):
-                self.report("disturbed", name=name, sentence=CLASSES[name].sentence, bodies=[], phase="planning")
-        if kind == "action_started" and not self._is_planned:
-            self._is_planned = True
+        if kind == "action_started":
             self._choose_phases()
         if kind == "phase":
             for coming in self._coming:
@@ -111,20 +116,33 @@ class Driver:
         self._plant.before_step = self._look_at_the_clock
         return self._plant
 
+    def _strike(self, name: str) -> None:
+        """Software fails, now: the first time is told."""
+        if name not in self._struck:
+            self._struck.add(name)
+            self._tell(name, Deed(CLASSES[name].sentence, is_certain=True))
+
     def _choose_phases(self) -> None:
-        """Every class goes through the kinds of phases in the plan from seed to seed; of a kind it takes any."""
+        """Every class goes through the kinds of phases in the plan from seed to seed; of a kind it takes any. Chosen
+        anew when the action in question is no longer to come."""
         assert self._machine is not None
+        agenda = self._machine.agenda
+        left = {str(action) for action in agenda.left}
+        scenario = self._machine.context.scene.scenario
         for coming in self._coming:
-            if coming.kind is None or coming.due is not None or coming.spot is not None:
+            is_to_come = coming.spot is not None and coming.spot[0] in left
+            if coming.kind is None or coming.due is not None or is_to_come:
                 continue
+            coming.spot = None
             kinds: dict[tuple[str, str], list[tuple[str, str]]] = {}
-            refinements = self._machine.agenda.refinements
-            for refinement in refinements:
+            refinements = agenda.refinements[len(agenda.refinements) - len(agenda.left) :]
+            for number, refinement in enumerate(refinements):
+                later = agenda.left[number:]
                 for phase in refinement.phases:
                     # Once the last thing is let go of, there is nothing left that could go wrong.
                     if refinement is refinements[-1] and phase.name == refinement.phases[-1].name:
                         break
-                    if coming.kind.fits(phase):
+                    if coming.kind.fits(Prospect(phase, later, scenario)):
                         spots = kinds.setdefault((refinement.action.name, phase.name), [])
                         spots.append((str(refinement.action), phase.name))
             if kinds:
@@ -151,13 +169,28 @@ class Driver:
     def _look_at_the_clock(self, t: float) -> None:
         for coming in [one for one in self._coming if one.due is not None and one.due <= t]:
             self._do(coming, t)
+        if self._trials and t >= self._look_again:
+            self._look_for_consequences(t)
+
+    def _look_for_consequences(self, t: float) -> None:
+        self._look_again = t + LOOK_EVERY
+        now = self._occasion(t, np.random.default_rng(self.seed))
+        for trial in list(self._trials):
+            is_proven = trial.is_proven(now)
+            if is_proven:
+                self.report("mattered", number=trial.number)
+            if is_proven or t > trial.until:
+                self._trials.remove(trial)
+
+    def _occasion(self, t: float, rng: np.random.Generator) -> Occasion:
+        assert self._machine is not None
+        assert self._plant is not None
+        assert self._motion is not None
+        return Occasion(t, self._plant.truth(), self._machine, self._motion, rng)
 
     def _do(self, coming: _Coming, t: float) -> None:
-        machine, plant = self._machine, self._plant
-        assert machine is not None
-        assert plant is not None
-        assert self._motion is not None
-        deed = coming.draw(Occasion(t, plant.truth(), machine, self._motion, coming.rng))
+        now = self._occasion(t, coming.rng)
+        deed = coming.draw(now)
         if deed is None:
             coming.tries += 1
             coming.due = t + AGAIN
@@ -165,14 +198,35 @@ class Driver:
                 self._coming.remove(coming)
             return
         self._coming.remove(coming)
-        self._carry_out(coming, deed, machine, plant)
+        self._carry_out(coming, deed, now)
 
-    def _carry_out(self, coming: _Coming, deed: Deed, machine: Machine, plant: DisturbedPlant) -> None:
-        phase = machine.context.phase.name if machine.context.phase and machine.agenda.running else "planning"
-        self.report("disturbed", name=coming.name, sentence=deed.sentence, bodies=list(deed.names), phase=phase)
+    def _carry_out(self, coming: _Coming, deed: Deed, now: Occasion) -> None:
+        assert self._plant is not None
+        self._tell(coming.name, deed)
+        if not deed.is_certain:
+            self._trials.append(Trial.of(self._told - 1, deed, now))
+            self._look_again = now.t + HAIR
         for fault in deed.faults:
-            plant.suffer(fault)
+            self._plant.suffer(fault)
         if deed.goal is not None:
-            machine.agenda.want(deed.goal)
+            now.machine.agenda.want(deed.goal)
         if deed.later is not None:
             self._coming.append(_Coming(coming.name, deed.later.draw, coming.rng, due=deed.later.t))
+
+    def _tell(self, name: str, deed: Deed) -> None:
+        machine = self._machine
+        assert machine is not None
+        running, phase = machine.agenda.running, machine.context.phase
+        self._told += 1
+        self.report(
+            "disturbed",
+            name=name,
+            sentence=deed.sentence,
+            bodies=list(deed.names),
+            phase=phase.name if phase is not None and running is not None else "planning",
+            action=str(running or ""),
+            mattered=deed.is_certain,
+            is_urgent=running is not None
+            and (deed.is_in_the_way or not frozenset(running.args).isdisjoint(deed.names)),
+            shifts={fault.region: fault.by for fault in deed.faults if isinstance(fault, BinShifted)},
+        )

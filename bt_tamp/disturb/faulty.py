@@ -1,5 +1,9 @@
-"""Software that fails, wired in at the seams of the real: a solver, a motion planner, a task planner."""
+"""Software that fails, wired in at the seams of the real: a solver, a motion planner, a task planner.
 
+Each calls `strike` whenever it fails.
+"""
+
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -19,9 +23,10 @@ from skills.control.torque_qp import SPARE_ROWS
 class FailingSolver:
     """OSQP, of whose answers those in `spells` (first call, number of calls) say `status` and mean nothing."""
 
-    def __init__(self, status: str, spells: tuple[tuple[int, int], ...]) -> None:
+    def __init__(self, status: str, spells: tuple[tuple[int, int], ...], strike: Callable[[], None]) -> None:
         self._real = Workspace(7, 7 + SPARE_ROWS)
         self._status, self._spells, self._calls = status, spells, 0
+        self._strike = strike
 
     def solve(
         self,
@@ -33,6 +38,7 @@ class FailingSolver:
         x, status = self._real.solve(P, g, bounds, rows)
         self._calls += 1
         if any(first <= self._calls < first + number for first, number in self._spells):
+            self._strike()
             return np.full_like(x, np.nan), self._status
         return x, status
 
@@ -42,9 +48,9 @@ class ExhaustedMotionPlanner(MotionPlanner):
 
     every = 4
 
-    def __init__(self, *args: Any, **settings: Any) -> None:
+    def __init__(self, *args: Any, strike: Callable[[], None], **settings: Any) -> None:
         super().__init__(*args, **settings)
-        self._asked = 0
+        self._asked, self._strike = 0, strike
 
     def move(
         self,
@@ -55,6 +61,7 @@ class ExhaustedMotionPlanner(MotionPlanner):
     ) -> Trajectory | MotionFailure:
         self._asked += 1
         if self._asked % self.every == 0:
+            self._strike()
             return MotionFailure(f"no path within {max_checks} checks")
         return super().move(scene, q_goals, allowed, max_checks)
 
@@ -62,14 +69,16 @@ class ExhaustedMotionPlanner(MotionPlanner):
 class FailingTaskPlanner:
     """A task planner that crashes, runs out of budget or talks nonsense in every second of its first answers."""
 
-    def __init__(self, real: TaskPlanner, first: int = 6) -> None:
+    def __init__(self, real: TaskPlanner, strike: Callable[[], None], first: int = 6) -> None:
         self._real, self._first, self._asked = real, first, 0
+        self._strike = strike
 
     def solve(self, domain_text: str, problem_text: str, max_expansions: int) -> TaskPlan | NoTaskPlan:
         self._asked += 1
         found = self._real.solve(domain_text, problem_text, max_expansions)
         if self._asked > self._first or self._asked % 2 == 0:
             return found
+        self._strike()
         if self._asked % 6 == 1:
             raise MemoryError("out of memory on purpose")
         if self._asked % 6 == 3 and isinstance(found, TaskPlan):

@@ -5,6 +5,7 @@ import pinocchio as pin
 from pinocchio import SE3
 
 from bt_tamp.disturb.deed import Deed, Draw, Occasion
+from bt_tamp.disturb.disorders import disordered
 from planner.task.facts import goal_facts
 from scenarios.disturbance import (
     Bring,
@@ -17,18 +18,7 @@ from scenarios.disturbance import (
     Take,
     WeakenGrip,
 )
-from sim.disturbance import Fault
-from sim.robot_faults import JointFriction, Push, WeakGrip
-from sim.sensor_faults import (
-    ForceBias,
-    ForceFrozen,
-    ForceMissing,
-    ForceNoise,
-    JointDelay,
-    PoseDelay,
-    PoseMissing,
-    PoseNoise,
-)
+from sim.robot_faults import Push, WeakGrip
 from sim.world_faults import BinShifted, Brought, Moved, TakenAway
 
 
@@ -61,48 +51,13 @@ def _deed(happening: Happening, now: Occasion) -> Deed | None:
         case PushArm(force, seconds, link):
             size = float(np.linalg.norm(force))
             push = Push(start=t, end=t + seconds, force=force, link=link)
-            return Deed(f"someone pushed the arm with {size:.0f} N for {seconds:g} s", (push,))
+            return Deed(f"someone pushed the arm with {size:.0f} N for {seconds:g} s", (push,), is_certain=True)
         case WeakenGrip(force, seconds):
             weak = WeakGrip(start=t, end=t + seconds, force=force)
-            return Deed(f"the gripper pressed with {force:g} N at most for {seconds:g} s", (weak,))
+            said = f"the gripper pressed with {force:g} N at most for {seconds:g} s"
+            held = now.held
+            return Deed(said, (weak,), names=() if held is None else (held,), loosens=held is not None)
         case Disorder(what, size, seconds):
-            return Deed(_SAID[what].format(size=size, seconds=seconds), (_fault(happening, now),))
+            return disordered(now, what, size, seconds)
         case NewGoal(goal):
             return Deed("something else was wanted from then on", goal=goal_facts(goal))
-
-
-_SAID = {
-    "force-bias": "the force sensor was off by {size:g} N for {seconds:g} s",
-    "force-noise": "the force sensor was noisy for {seconds:g} s, by {size:g} N",
-    "force-missing": "the force sensor said nothing for {seconds:g} s",
-    "force-frozen": "the force sensor was frozen for {seconds:g} s",
-    "joint-delay": "the joints' state came {size:g} s late for {seconds:g} s",
-    "joint-friction": "the joints rubbed with {size:g} Nm for {seconds:g} s",
-    "pose-noise": "objects were seen with {size:g} m of noise for {seconds:g} s",
-    "pose-delay": "objects were seen {size:g} s late for {seconds:g} s",
-    "pose-missing": "no object was seen for {seconds:g} s",
-}
-
-
-def _fault(disorder: Disorder, now: Occasion) -> Fault:
-    size, seed = disorder.size, int(now.rng.integers(2**31))
-    start, end = now.t, now.t + disorder.seconds
-    match disorder.what:
-        case "force-bias":
-            return ForceBias(start=start, end=end, force=(0.0, 0.0, size))
-        case "force-noise":
-            return ForceNoise(start=start, end=end, force=size, seed=seed)
-        case "force-missing":
-            return ForceMissing(start=start, end=end)
-        case "force-frozen":
-            return ForceFrozen(start=start, end=end)
-        case "joint-delay":
-            return JointDelay(start=start, end=end, seconds=size)
-        case "joint-friction":
-            return JointFriction(start=start, end=end, torque=(size,) * 7)
-        case "pose-noise":
-            return PoseNoise(start=start, end=end, position=size, seed=seed)
-        case "pose-delay":
-            return PoseDelay(start=start, end=end, seconds=size)
-        case "pose-missing":
-            return PoseMissing(start=start, end=end)

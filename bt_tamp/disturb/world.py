@@ -1,6 +1,7 @@
 """What is done to the world: each function draws one instance of its class for an occasion."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -10,8 +11,10 @@ from pinocchio import SE3
 
 from bt_tamp.disturb.deed import Deed, Later, Occasion
 from planner.task.symbols import Fact
-from scenarios.goal import is_crumb
+from scenarios.scenario import Region
 from scenarios.shapes import extents
+from scenarios.solids import body_solid, region_hull, table_solid
+from scenarios.standing import overlap_problem
 from sim.scene import depth_below, height_above
 from sim.world_faults import BinShifted, Brought, Moved, Slippery, TakenAway
 
@@ -19,6 +22,12 @@ T = TypeVar("T")
 
 NEAR = (0.04, 0.15)
 """Metres by which something is moved."""
+
+STRAY = 0.05
+"""Metres by which a shifted bin may come nearer to the robot or go further away."""
+
+SLIPPERY = 1.0
+"""Seconds for which something slips."""
 
 AWAY = (2.0, 5.0)
 """Seconds for which something is gone."""
@@ -36,7 +45,7 @@ def moved(now: Occasion) -> Deed | None:
 
 def rotated(now: Occasion) -> Deed | None:
     """An object is turned on the spot."""
-    for name in _shuffled(now, [name for name in _on_table(now) if not _is_crumb(now, name)]):
+    for name in _shuffled(now, [name for name in _on_table(now) if not now.is_crumb(name)]):
         X_WO = now.truth.poses[name]
         for _ in range(10):
             angle = now.rng.uniform(np.radians(30.0), np.radians(90.0)) * now.rng.choice([-1.0, 1.0])
@@ -82,7 +91,7 @@ def brought_back(now: Occasion, name: str, X_WO: SE3) -> Deed | None:
 def taken_for_good(now: Occasion) -> Deed | None:
     """An object that the goal is about is taken away and does not come back."""
     in_hand = [now.held] if now.held is not None and now.held in _goal_bodies(now) else []
-    for name in [*_shuffled(now, _lacking(now)), *in_hand]:
+    for name in [*_shuffled(now, now.lacking()), *in_hand]:
         return Deed(f"{name} was taken away for good", (TakenAway(start=now.t, name=name),), names=(name,))
     return None
 
@@ -118,7 +127,8 @@ def path_blocked(now: Occasion, name: str) -> Deed | None:
         scene = now.scene.moved(name, X_WO)
         hit = now.motion.audit(scene, phase.trajectory, phase.allowed, since=passed, only=frozenset({name}))
         if hit is not None:
-            return Deed(f"{name} was put in the way", (Brought(start=now.t, name=name, X_WO=X_WO),), names=(name,))
+            fault = Brought(start=now.t, name=name, X_WO=X_WO)
+            return Deed(f"{name} was put in the way", (fault,), names=(name,), is_certain=True, is_in_the_way=True)
     return None
 
 
@@ -137,12 +147,12 @@ def knocked_from_hand(now: Occasion) -> Deed | None:
 
 
 def slipping(now: Occasion) -> Deed | None:
-    """What is held turns slippery for a while."""
+    """What is held turns slippery for a while, over something that catches it."""
     name = now.held
-    if name is None:
+    if name is None or not now.falls_within_reach(SLIPPERY):
         return None
-    fault = Slippery(start=now.t, end=now.t + 1.0, name=name, friction=0.002)
-    return Deed(f"{name} turned slippery in the hand for 1 s", (fault,), names=(name,))
+    fault = Slippery(start=now.t, end=now.t + SLIPPERY, name=name, friction=0.002)
+    return Deed(f"{name} turned slippery in the hand for 1 s", (fault,), names=(name,), loosens=True)
 
 
 def closes_on_nothing(now: Occasion) -> Deed | None:
@@ -158,7 +168,7 @@ def closes_on_nothing(now: Occasion) -> Deed | None:
 
 def sponge_far(now: Occasion) -> Deed | None:
     """The sponge is put at another end of the table."""
-    for name in _sponges(now):
+    for name in [name for name in now.tools() if name in _on_the_way(now)]:
         X_WO = now.truth.poses[name]
         rotation = _about_z(now.rng.uniform(0.0, np.pi)) @ now.scenario.bodies[name].X_WO.rotation
         spot = now.spot(now.scenario.bodies[name], rotation, X_WO.translation[:2], (0.25, 0.60))
@@ -169,7 +179,7 @@ def sponge_far(now: Occasion) -> Deed | None:
 
 def sponge_covered(now: Occasion, cover: str) -> Deed | None:
     """The late body `cover` is put on the sponge."""
-    for name in [name for name in _sponges(now) if name != now.held]:
+    for name in [name for name in now.tools() if name in _on_the_way(now)]:
         top = now.truth.poses[name]
         body = now.scenario.bodies[cover]
         z = height_above(now.scenario.bodies[name].shape, top.rotation) + depth_below(body.shape, np.eye(3)) + 1e-3
@@ -181,8 +191,12 @@ def sponge_covered(now: Occasion, cover: str) -> Deed | None:
 
 
 def sponge_out_of_reach(now: Occasion) -> Deed | None:
-    """The sponge is thrown on the floor, far from the robot."""
-    for name in [name for name in _sponges(now) if name in _lacking(now)]:
+    """A sponge that can't be done without is thrown on the floor, far from the robot."""
+    tools = now.tools()
+    for name in tools:
+        wanted = any(fact.args[:1] == (name,) for fact in now.machine.agenda.goal)
+        if not wanted and not (len(tools) == 1 and any(now.is_crumb(body) for body in now.lacking())):
+            continue
         base = now.scenario.robot.X_WB.translation
         spot = SE3(np.eye(3), np.array([base[0] + 1.8, base[1] + 1.8, 0.1]))
         return _put(now, name, spot, f"{name} was thrown on the floor, out of reach")
@@ -190,24 +204,33 @@ def sponge_out_of_reach(now: Occasion) -> Deed | None:
 
 
 def bin_shifted(now: Occasion) -> Deed | None:
-    """A bin that is still needed is shifted by some centimetres."""
+    """A bin that is still needed is shifted, so far that what was to be put into its middle would meet its wall or the
+    floor beside it, and not out of reach."""
     wanted = {arg for action in now.left for arg in action.args[1:]}
-    bins = [n for n, region in now.scenario.regions.items() if region.kind == "bin" and n in wanted]
+    places = regions_now(now)
+    bins = [name for name, region in places.items() if region.kind == "bin" and name in wanted]
+    base = now.scenario.robot.X_WB.translation[:2]
     for name in _shuffled(now, bins):
-        region, base = now.scenario.regions[name], now.scenario.robot.X_WB.translation
-        outward = region.X_WR.translation[:2] - base[:2]
-        outward = outward / np.linalg.norm(outward)
-        sideways = np.array([-outward[1], outward[0]]) * now.rng.choice([-1.0, 1.0])
-        x, y = 0.03 * outward * now.rng.uniform(0.0, 1.0) + sideways * now.rng.uniform(0.03, 0.06)
-        fault = BinShifted(start=now.t, region=name, by=(float(x), float(y), 0.0))
-        return Deed(f"{name} was shifted by {100 * np.hypot(x, y):.0f} cm", (fault,), names=(name,))
+        region = places[name]
+        p = region.X_WR.translation[:2]
+        others = [region_hull(other) for other in places.values() if other.name != name]
+        others += [table_solid(now.scenario.table), *(body_solid(one) for one in now.scenario.fixtures.values())]
+        for share in now.rng.uniform(0.35, 0.6, size=40):
+            angle = now.rng.uniform(0.0, 2.0 * np.pi)
+            by = share * min(region.size[:2]) * np.array([np.cos(angle), np.sin(angle)])
+            is_reached = abs(float(np.linalg.norm(p + by - base)) - float(np.linalg.norm(p - base))) < STRAY
+            shift = SE3(np.eye(3), np.array([*by, 0.0]))
+            if is_reached and overlap_problem(region_hull(region).moved(shift), others) is None:
+                fault = BinShifted(start=now.t, region=name, by=(float(by[0]), float(by[1]), 0.0))
+                said = f"{name} was shifted by {100 * np.hypot(*by):.0f} cm"
+                return Deed(said, (fault,), names=(name,))
     return None
 
 
 def crumbs_beside_pan(now: Occasion) -> Deed | None:
     """A crumb comes to lie on the table's edge, beside the dustpan's opening."""
     pans = [region for region in now.scenario.regions.values() if region.kind == "dustpan"]
-    crumbs = [name for name in now.truth.poses if _is_crumb(now, name) and name != now.held]
+    crumbs = [name for name in now.truth.poses if now.is_crumb(name) and name != now.held]
     for pan in pans:
         for name in _shuffled(now, [name for name in crumbs if name in _goal_bodies(now)]):
             body = now.scenario.bodies[name]
@@ -237,6 +260,12 @@ def goal_changed(now: Occasion) -> Deed | None:
     return None
 
 
+def regions_now(now: Occasion) -> dict[str, Region]:
+    """The regions where they stand in truth."""
+    seen = now.truth.regions
+    return {n: replace(region, X_WR=seen.get(n, region.X_WR)) for n, region in now.scenario.regions.items()}
+
+
 def _put(now: Occasion, name: str, X_WO: SE3, sentence: str) -> Deed:
     return Deed(sentence, (Moved(start=now.t, name=name, X_WO=X_WO),), names=(name,))
 
@@ -258,34 +287,19 @@ def _on_table(now: Occasion) -> list[str]:
     ]
 
 
-def _lacking(now: Occasion) -> list[str]:
-    """Bodies that are there, not in the hand, and that the goal still lacks."""
-    agenda = now.machine.agenda
-    missing = agenda.goal - agenda.facts(now.machine.context.scene)
-    names = sorted({fact.args[0] for fact in missing if fact.args})
-    return [name for name in names if name in now.truth.poses and name != now.held]
+def _on_the_way(now: Occasion) -> set[str]:
+    """What is still to be taken up, and not in the hand."""
+    return {action.args[0] for action in now.left if action.name == "pick"} - {now.held}
 
 
 def _goal_bodies(now: Occasion) -> set[str]:
     return {fact.args[0] for fact in now.machine.agenda.goal if fact.args}
 
 
-def _sponges(now: Occasion) -> list[str]:
-    """Sponges that are there and still needed."""
-    bodies = now.scenario.bodies
-    needed = {arg for action in now.left for arg in action.args} | set(_lacking(now))
-    wipes = any(_is_crumb(now, name) for name in _lacking(now))
-    return [name for name in now.truth.poses if bodies[name].tool == "sponge" and (wipes or name in needed)]
-
-
-def _is_crumb(now: Occasion, name: str) -> bool:
-    return is_crumb(now.scenario.bodies[name], now.scenario.robot.model)
-
-
 def _stands(now: Occasion, name: str) -> bool:
     body, R = now.scenario.bodies[name], now.truth.poses[name].rotation
     height = height_above(body.shape, R) + depth_below(body.shape, R)
-    return not _is_crumb(now, name) and body.tool is None and height > 1.3 * float(min(extents(body.shape)))
+    return not now.is_crumb(name) and body.tool is None and height > 1.3 * float(min(extents(body.shape)))
 
 
 def _between(X_WA: SE3, X_WB: SE3) -> float:

@@ -130,7 +130,10 @@ class Agenda:
         gone = sorted({fact.args[0] for fact in self.plan.goal & self.goal - self.pursued(scene)})
         if gone:
             return f"{', '.join(gone)} can't be seen any more"
-        return "what is wanted, or what is there, has changed"
+        if not self.plan.goal <= self.goal:
+            return "something else is wanted now"
+        come = sorted({fact.args[0] for fact in self.pursued(scene) - self.plan.goal})
+        return f"{', '.join(come)} {'is' if len(come) == 1 else 'are'} to be seen now, and wanted"
 
     def begin(self) -> None:
         """An action of the plan has started."""

@@ -8,7 +8,7 @@ import numpy as np
 from pinocchio import SE3
 
 from bt_tamp.executive.rest import at_rest
-from bt_tamp.executive.sighting import REMEMBERED, Sighting
+from bt_tamp.executive.sighting import OVERLOOKED, REMEMBERED, Sighting
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, outline
 from sim.plant import Observation
@@ -46,6 +46,7 @@ class Belief:
         self._X_GO: SE3 | None = None
         self._known: dict[str, tuple[float, SE3]] = {}
         self._hands: deque[tuple[float, SE3]] = deque()
+        self._was_blind = False
 
     def update(self, observation: Observation, is_closing: bool) -> SceneState:
         """The scene as believed after an observation; `is_closing`: the fingers are told to press."""
@@ -81,7 +82,13 @@ class Belief:
         for name, X_WO in observation.poses.items():
             sighting = self._lying.setdefault(name, Sighting())
             known[name] = (t, sighting.see(X_WO, at_rest(observation.velocities[name])))
-        for name in [name for name, (seen, _) in known.items() if t - seen > REMEMBERED]:
+        patience = OVERLOOKED if observation.poses else REMEMBERED
+        if self._was_blind and observation.poses:
+            # What doesn't turn up again with the rest is looked for from now on.
+            for name in known.keys() - observation.poses.keys():
+                known[name] = (t, known[name][1])
+        self._was_blind = not observation.poses
+        for name in [name for name, (seen, _) in known.items() if t - seen > patience]:
             del known[name]
         return {name: known[name][1] for name in self._declared.bodies if name in known}
 

@@ -16,6 +16,7 @@ from bt_tamp.executive.audit import ContactAudit
 from bt_tamp.executive.befallen import Ledger
 from bt_tamp.executive.build import CONTROL_EVERY, TREE_EVERY, Machine, build
 from bt_tamp.executive.force_audit import ForceAudit
+from bt_tamp.executive.peak_audit import PeakAudit
 from bt_tamp.executive.plan_node import LOST_PATIENCE
 from bt_tamp.executive.resuming import entering, state_of, take_up
 from bt_tamp.executive.seams import REAL
@@ -31,8 +32,14 @@ from scenarios.scenario import Scenario
 from sim.disturbance import DisturbedPlant
 from sim.plant import Command
 
+STANDS = ("run_started", "plan_installed", "action_started", "action_done", "action_failed")
+"""Events at which it is written down how things stand: a run that is killed goes on from the last."""
+
 SAMPLE_EVERY = 5
 """Control ticks between two samples of the signals and two looks at the true contacts: 100 Hz."""
+
+WORTH_A_LOOK = 15.0
+"""Newtons felt at the wrist from which the true contacts are looked at in every tick: a blow is over soon."""
 
 BRAKING = 2.0
 """Simulated seconds that the arm gets to come to rest after an interruption."""
@@ -54,7 +61,8 @@ class Tally:
     t: float = 0.0
     results: Results = field(default_factory=Results)
     energy_j: float = 0.0
-    peak_force_n: float = 0.0
+    peak_felt_n: float = 0.0
+    unlawful: int = 0
     learned: dict[str, None] = field(default_factory=dict)
     failed: Counter[str] = field(default_factory=Counter)
     reasons: dict[str, str] = field(default_factory=dict)
@@ -69,10 +77,11 @@ class Audits:
 
     contacts: ContactAudit
     forces: ForceAudit
+    peaks: PeakAudit
 
     @staticmethod
     def of(machine: Machine) -> "Audits":
-        return Audits(ContactAudit(machine.robot), ForceAudit(machine.robot))
+        return Audits(ContactAudit(machine.robot), ForceAudit(machine.robot), PeakAudit(machine.robot))
 
 
 @dataclass(frozen=True)
@@ -101,6 +110,8 @@ def run_scenario(
             tally.failed[data["action"]] += 1
             tally.reasons[data["action"]] = data["reason"]
         tally.befallen.hear(kind, tally.t, data)
+        if kind in STANDS and recorder.is_kept:
+            recorder.state(state_of(machine))
         _report(recorder, tally.t, kind, data, machine.planner.thinking.rounds)
         if driver is not None:
             driver.hear(kind, tally.t, data.get("phase", ""), data.get("action", ""))
@@ -180,6 +191,7 @@ def look(machine: Machine, tally: Tally, n: int) -> None:
         # BehaviourTree.tick would walk through the whole tree once more, for visitors of a kind that is not here.
         for node in machine.mission.root.tick():
             node.visit(tally.results)
+        tally.befallen.look(tally.t, context.controller.is_still)
         machine.plant.lap("tree")
 
 
@@ -187,6 +199,8 @@ def act(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally, n
     """Second half of control tick n: control, record, and let the world go on."""
     plant, context = machine.plant, machine.context
     tau = context.controller.update(context.observation)
+    # Written so that a command of NaN is counted too.
+    tally.unlawful += not (np.abs(tau) <= machine.robot.tau_max).all()
     plant.apply(Command(tau, context.grip.command(context.observation)))
     plant.lap("apply")
     _account(machine, recorder, audits, tally, n)
@@ -199,8 +213,12 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
     context = machine.context
     controller, observation = context.controller, context.observation
     force = controller.contact_force if controller.contact else 0.0
-    tally.peak_force_n = max(tally.peak_force_n, force)
-    if n % SAMPLE_EVERY == 0:
+    tally.peak_felt_n = max(tally.peak_felt_n, force)
+    is_due = n % SAMPLE_EVERY == 0
+    if is_due or controller.felt > WORTH_A_LOOK:
+        contacts = machine.plant.contacts()
+        audits.peaks.look(contacts, context)
+    if is_due:
         power = float(np.abs(observation.tau) @ np.abs(observation.v))
         tally.energy_j += power * SAMPLE_EVERY * CONTROL_EVERY * machine.plant.timestep
         reference = controller.reference
@@ -210,7 +228,6 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
         # What is recorded is what was, not what was sensed.
         truth = machine.plant.truth() if isinstance(machine.plant, DisturbedPlant) else observation
         recorder.sample(truth, Reference(q_ref, p_ref, wanted), force)
-        contacts = machine.plant.contacts()
         running = str(machine.agenda.running or "planning")
         audits.contacts.look(observation.t, contacts, context, running)
         audits.forces.look(observation.t, contacts, context, running)
@@ -289,6 +306,7 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audits: Audits
         goal={str(fact): fact in known for fact in sorted(agenda.goal)},
         plan=tuple(str(action) for action in agenda.plan.actions) if agenda.plan else (),
         executed=tuple(str(action) for action in agenda.executed),
+        executed_s=tally.befallen.durations,
         learned=tuple(tally.learned),
         places=places,
         rounds=thinking.rounds,
@@ -297,8 +315,10 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audits: Audits
         planning_wall_s=thinking.wall_s,
         robot_s=context.observation.t,
         wall_s=time.perf_counter() - tally.started,
-        peak_contact_force_n=tally.peak_force_n,
+        peak_contact_force_n=tally.peak_felt_n,
+        peak_force_n=audits.peaks.peak,
         torque_limit_violations=context.controller.torque_limit_violations,
+        unlawful_commands=tally.unlawful,
         unintended_contacts=tuple(audits.contacts.found),
         pressed=audits.forces.found,
         peak_rss_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,

@@ -29,7 +29,10 @@ MEDIAN_STEP = 2.18
 """Median distance of two points with standard deviation 1 in each direction."""
 
 REMEMBERED = 1.5
-"""Seconds for which something out of sight is believed to be where it was."""
+"""Seconds for which something out of sight is believed to be where it was while nothing at all is seen."""
+
+OVERLOOKED = 0.1
+"""The same while other things are seen: eyes that work would see it, too."""
 
 
 class Sighting:

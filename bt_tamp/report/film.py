@@ -1,12 +1,13 @@
 """A recorded run as pictures: at each time the rendered state, the forces, the set-points and the words."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from pinocchio import SE3
 
-from bt_tamp.report.events import read_events
+from bt_tamp.report.events import Event, read_events
 from bt_tamp.report.folder import EVENTS, SCENARIO, SIGNALS
 from bt_tamp.report.overlay import STRIP, Arrow, Path3, Words, draw
 from bt_tamp.report.scenario_json import scenario_from_json
@@ -34,11 +35,12 @@ class Shot:
 
 @dataclass(frozen=True)
 class Recording:
-    """What a run's folder holds of it."""
+    """What a run's folder holds of it. shifts: when (s) which region was shifted, by how much in W (m); in order."""
 
     scenario: Scenario
     signals: Signals
     timeline: Timeline
+    shifts: tuple[tuple[float, str, tuple[float, ...]], ...] = ()
 
     @staticmethod
     def load(folder: Path) -> "Recording":
@@ -47,7 +49,16 @@ class Recording:
         signals = Signals.load(folder / SIGNALS)
         if not len(signals.t):
             raise ValueError(f"{folder / SIGNALS}: holds no sample, expected a run that got as far as moving")
-        return Recording(scenario, signals, Timeline.of(read_events(folder / EVENTS)))
+        events = list(read_events(folder / EVENTS))
+        return Recording(scenario, signals, Timeline.of(events), tuple(_shifts(events)))
+
+    def scene_at(self, t: float) -> Scenario:
+        """The scene with its regions where they stood at time t (s)."""
+        regions = dict(self.scenario.regions)
+        for _, name, by in (shift for shift in self.shifts if shift[0] <= t):
+            X_WR = regions[name].X_WR
+            regions[name] = replace(regions[name], X_WR=SE3(X_WR.rotation, X_WR.translation + np.array(by)))
+        return self.scenario if regions == self.scenario.regions else replace(self.scenario, regions=regions)
 
     @property
     def duration(self) -> float:
@@ -62,6 +73,7 @@ class Filming:
         self.recording = recording
         self.backdrop = backdrop or backdrop_of(recording.scenario)
         self._renderer = Renderer(recording.scenario, self.backdrop, engine)
+        self._scenario, self._engine = recording.scenario, engine
         self._hands = frozenset(RobotModel.links)
 
     def __enter__(self) -> "Filming":
@@ -77,6 +89,7 @@ class Filming:
     def take(self, shot: Shot) -> np.ndarray:
         """The picture (HEIGHT, WIDTH, 3) uint8 of a shot."""
         signals = self.recording.signals
+        self._look_at(self.recording.scene_at(shot.t))
         row = int(np.clip(np.searchsorted(signals.t, shot.t + 1e-9) - 1, 0, len(signals.t) - 1))
         seen = zip(signals.bodies.tolist(), signals.poses[row], strict=True)
         poses = {name: pose for name, pose in seen if np.isfinite(pose[0])}
@@ -91,6 +104,14 @@ class Filming:
         )
         return draw(picture, self._renderer.camera, self._arrows(shot.t), set_points(signals, row), words)
 
+    def _look_at(self, scenario: Scenario) -> None:
+        """Regions may have been shifted: what never moves is drawn anew then, from the same point of view."""
+        if scenario.regions == self._scenario.regions:
+            return
+        self._renderer.close()
+        backdrop = Backdrop.seen(scenario, self.backdrop.camera, self.backdrop.light)
+        self._renderer, self._scenario = Renderer(scenario, backdrop, self._engine), scenario
+
     def _arrows(self, t: float) -> list[Arrow]:
         signals = self.recording.signals
         last = int(np.searchsorted(signals.contact_t, t + 1e-9)) - 1
@@ -99,6 +120,12 @@ class Filming:
         now = np.flatnonzero(signals.contact_t == signals.contact_t[last])
         names = [(str(signals.contact_names[a]), str(signals.contact_names[b])) for a, b in signals.contact_pair[now]]
         return net_forces(names, signals.contact_p[now], signals.contact_f[now], self._hands)
+
+
+def _shifts(events: Iterable[Event]) -> Iterator[tuple[float, str, tuple[float, ...]]]:
+    for event in events:
+        for name, by in event.data.get("shifts", {}).items():
+            yield event.t, name, tuple(by)
 
 
 def backdrop_of(scenario: Scenario) -> Backdrop:

@@ -125,11 +125,20 @@ class RunRecorder:
         """An error in our own code ended the run; `trace` is its traceback."""
         self._text(CRASH, trace)
 
+    @property
+    def is_kept(self) -> bool:
+        """Is the run written into a folder?"""
+        return self.folder is not None
+
+    def state(self, state: RunState) -> None:
+        """How things stand now: where another run can go on, should this one be killed."""
+        self._text(STATE, state.to_json())
+
     def finish(self, result: RunResult, state: RunState) -> None:
         """The run has ended, things standing as in `state`: everything is written, `result.json` last."""
         self.result = result
         self._save_signals()
-        self._text(STATE, state.to_json())
+        self.state(state)
         self._text(RESULT, result.to_json())
 
     def close(self) -> None:

@@ -49,7 +49,12 @@ class PressedMotion:
 @dataclass(frozen=True)
 class Befallen:
     """A disturbance: when (s), of which class ("declared" for the scene's own), what was done, in which phase; and what
-    the run answered first (`refined_again`, `action_failed`, `replan`, `rebuilt`, or nothing), after how many s."""
+    the run answered first (`refined_again`, `action_failed`, `replan`, `rebuilt`, or nothing), after how many s.
+
+    action: what ran then, "" while planning. bodies: what it was done to. mattered: it changed a fact or a geometry
+    that the rest of the run rests on. is_urgent: it concerned the running action. reacted_after_s: if so, and the
+    action did answer, the seconds until the arm stood still or set out anew, thinking included.
+    """
 
     t: float
     name: str
@@ -57,17 +62,25 @@ class Befallen:
     phase: str
     answer: str = ""
     answered_after_s: float | None = None
+    action: str = ""
+    bodies: tuple[str, ...] = ()
+    mattered: bool = True
+    is_urgent: bool = False
+    reacted_after_s: float | None = None
 
 
 @dataclass(frozen=True)
 class RunResult:
     """One run. Field names are the keys of `result.json`.
 
-    goal: literal → does it hold at the end. plan: actions of the last plan; executed: actions that
-    were done, in order. disturbances: what befell it. learned: sentences. places: where each movable
+    goal: literal → does it hold at the end. plan: actions of the last plan; executed: actions that were done, in order,
+    and executed_s: how long each took. disturbances: what befell it. learned: sentences. places: where each movable
     body lies at the end (a region's name, "table", "hand", "floor" or "nowhere"). reason: why it ended so,
     one sentence. planning_cpu_s counts all rounds and re-refinements, children included. robot_s is simulated,
-    wall_s real time. energy_j is ∫|τ·q̇|dt. reproducible: no wall-clock watchdog cut anything short.
+    wall_s real time. peak_contact_force_n: what the controller felt along the normal; peak_force_n: the engine's true
+    net force of any one thing on the arm and what it holds (what both fingers squeeze cancels out).
+    unlawful_commands: those with a torque beyond its limit, or none at all (NaN). energy_j is ∫|τ·q̇|dt.
+    reproducible: no wall-clock watchdog cut anything short.
     """
 
     scenario: str
@@ -77,6 +90,7 @@ class RunResult:
     goal: Mapping[str, bool]
     plan: tuple[str, ...] = ()
     executed: tuple[str, ...] = ()
+    executed_s: tuple[float, ...] = ()
     learned: tuple[str, ...] = ()
     places: Mapping[str, str] = field(default_factory=dict)
     rounds: int = 0
@@ -86,7 +100,9 @@ class RunResult:
     robot_s: float = 0.0
     wall_s: float = 0.0
     peak_contact_force_n: float = 0.0
+    peak_force_n: float = 0.0
     torque_limit_violations: int = 0
+    unlawful_commands: int = 0
     unintended_contacts: tuple[UnintendedContact, ...] = ()
     pressed: tuple[PressedMotion, ...] = ()
     peak_rss_mb: float = 0.0
@@ -109,9 +125,11 @@ class RunResult:
             data: dict[str, Any] = json.loads(text)
             data["unintended_contacts"] = tuple(UnintendedContact(**c) for c in data["unintended_contacts"])
             data["pressed"] = tuple(PressedMotion(**motion) for motion in data["pressed"])
-            data["disturbances"] = tuple(Befallen(**one) for one in data.get("disturbances", ()))
-            for key in ("plan", "executed", "learned"):
-                data[key] = tuple(data[key])
+            data["disturbances"] = tuple(
+                Befallen(**(one | {"bodies": tuple(one.get("bodies", ()))})) for one in data.get("disturbances", ())
+            )
+            for key in ("plan", "executed", "executed_s", "learned"):
+                data[key] = tuple(data.get(key, ()))
             return RunResult(**data)
         except (TypeError, KeyError, AttributeError) as error:
             raise ValueError(f"not a run's result: {error}") from None

@@ -105,11 +105,16 @@ class _Teller:
         self._say(f"{data['action']} was worked out anew: {data['reason']}.", f"{event.t:7.1f} s          ")
 
     def _replan(self, event: Event, data: Any) -> None:
+        if self._running is not None:
+            where = f" in its phase {self._phases[-1]!r}" if self._phases else ""
+            self._say(f"{self._running} was broken off{where}.", f"{event.t:7.1f} s          ")
+            self._running = None
         reason = "" if data["reason"] == self._last_failure else f", because {data['reason']}"
         self._say(f"The plan was dropped{reason}, and a new one sought from what was observed then.")
 
     def _disturbed(self, event: Event, data: Any) -> None:
-        meanwhile = "" if data["phase"] == "planning" else f", during {data['phase']!r}"
+        during = f"{data['action']} in its phase {data['phase']!r}" if data.get("action") else repr(data["phase"])
+        meanwhile = ", while planning" if data["phase"] == "planning" else f", during {during}"
         self._say(f"DISTURBANCE{meanwhile}: {data['sentence']}.", f"{event.t:7.1f} s          ")
 
     def _missing(self, event: Event, data: Any) -> None:

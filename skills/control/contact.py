@@ -24,6 +24,10 @@ SENSOR_ERROR = (1.0, 0.3)
 """N and Nm that an untared sensor may be off by."""
 
 
+STUCK = 0.02
+"""Seconds of the very same reading, to the last bit, after which the sensor is taken for frozen: a live one varies."""
+
+
 class ContactWrench:
     """Wrench that the world exerts on the tool, at G in W axes (6,): `raw`, and `smooth` (low-passed).
 
@@ -42,6 +46,8 @@ class ContactWrench:
         self._bias_G = np.zeros(6)
         self._smooth_G = np.zeros(6)
         self._taring: _Mean | None = None
+        self._told: tuple[float, ...] = ()
+        self._stuck = 0.0
         self.raw = np.zeros(6)
         self.smooth = np.zeros(6)
         self.is_silent = False
@@ -60,12 +66,17 @@ class ContactWrench:
 
     def update(self, state: ArmState, wrist: Wrench) -> None:
         """Read the sensor, once every period, the arm being in `state`. The first reading only prepares for the
-        second. A reading that is not finite is left out: `is_silent`, and the last one stays."""
+        second. A reading that is not finite is left out, and the last one stays: `is_silent`, as when the sensor goes
+        on telling the very same."""
         last, self._last_v = self._last_v, state.v
         if last is None:
             return
-        self.is_silent = not math.isfinite(math.fsum((*wrist.force.tolist(), *wrist.torque.tolist())))
-        if self.is_silent:
+        told = (*wrist.force.tolist(), *wrist.torque.tolist())
+        is_missing = not math.isfinite(math.fsum(told))
+        self._stuck = self._stuck + self._period if told == self._told else 0.0
+        self._told = told
+        self.is_silent = is_missing or self._stuck > STUCK
+        if is_missing:
             return
         contact = np.empty(6)
         a = (state.v - last) / self._period

@@ -1,5 +1,6 @@
 """The arm's one controller: position, impedance and force laws on one torque QP, without bumps between them."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from sim.robot import RobotModel
 from sim.wrench import Wrench
 from skills.control.bridge import Bridge
 from skills.control.contact import ContactWrench, Touch
+from skills.control.cushion import cushion
 from skills.control.force import ForceLoop, smooth_step
 from skills.control.limits import ApproachLimit, Row
 from skills.control.momentum import MomentumObserver
@@ -66,6 +68,10 @@ COMPENSATED = 0.25
 
 COMPENSATION_RATE = 150.0
 """Nm/s at which that may change: joint friction turns round within 20 ms."""
+
+STOPPING, STOPPING_LADEN = 2.0, 1.3
+"""Times the acceleration of planned motions with which the arm may brake when it is told to hold, with nothing in the
+hand and with something, which must not slip."""
 
 YIELDING, YIELDING_DAMPING = 100.0, 30.0
 """1/s² and 1/s with which the arm holds after a collision: it gives way."""
@@ -202,6 +208,17 @@ class ArmController:
         return float(self._normal @ self._wrench.smooth[:3])
 
     @property
+    def felt(self) -> float:
+        """Force in N on the hand from outside, in whatever direction, as felt just now."""
+        x, y, z = self._wrench.raw[:3].tolist()
+        return math.sqrt(x * x + y * y + z * z)
+
+    @property
+    def is_still(self) -> bool:
+        """Is the arm at rest?"""
+        return self._state is not None and float(np.abs(self._state.v).max()) < AT_REST
+
+    @property
     def contact_wrench(self) -> Wrench:
         """Smoothed wrench that the world exerts on the tool, about G, in W axes."""
         return Wrench(self._wrench.smooth[:3].copy(), self._wrench.smooth[3:].copy())
@@ -264,6 +281,8 @@ class ArmController:
         self.lap("state")
         tasks, wrench, limits = self._law(state)
         feedforward = self._bridge.advance() - state.J.T @ wrench - self._compensation()
+        if self._unexplained is not None:
+            feedforward += cushion(state, self._robot)
         self.lap("law")
         solution = self._qp.solve(state, tasks, feedforward, limits)
         self._course.advance(self._period)
@@ -292,7 +311,8 @@ class ArmController:
 
     def _begin_hold(self, state: ArmState) -> None:
         self._reference, self._hold_pending = None, False
-        self._course = Course.stop(state.q, state.v, self._robot.a_max)
+        haste = STOPPING if self._robot is self._unloaded else STOPPING_LADEN
+        self._course = Course.stop(state.q, state.v, haste * self._robot.a_max)
         self._law_changed = True
         self._pressed = False
 

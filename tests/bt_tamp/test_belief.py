@@ -6,7 +6,7 @@ import pytest
 from pinocchio import SE3
 
 from bt_tamp.executive.belief import Belief
-from bt_tamp.executive.sighting import REMEMBERED, Sighting
+from bt_tamp.executive.sighting import OVERLOOKED, REMEMBERED, Sighting
 from scenarios.load import load_scenario
 from sim.plant import Observation
 from sim.robot import RobotModel
@@ -85,6 +85,20 @@ def held_at(scenario, q, X_GO, t, **changes):
 
 
 IN_HAND = SE3(np.eye(3), np.array([0.0, 0.0, -0.01]))
+
+
+def test_what_is_missing_while_the_rest_is_seen_is_gone_at_once_but_not_after_a_blink(scenario):
+    belief = Belief(scenario, ROBOT)
+    belief.update(seen(scenario, 0.0), False)
+    rest = {name: X for name, X in seen(scenario, 0.0).poses.items() if name != "cube"}
+    assert "cube" in belief.update(seen(scenario, TICK, poses=rest), False).poses
+    assert "cube" not in belief.update(seen(scenario, OVERLOOKED + TICK, poses=rest), False).poses
+
+    belief.update(seen(scenario, 1.0), False)
+    for t in np.arange(1.0, 2.0, TICK):
+        assert "cube" in belief.update(seen(scenario, t, poses={}), False).poses
+    assert "cube" in belief.update(seen(scenario, 2.0, poses=rest), False).poses
+    assert "cube" not in belief.update(seen(scenario, 2.0 + OVERLOOKED + TICK, poses=rest), False).poses
 
 
 def test_what_is_held_and_out_of_sight_is_still_held_and_moves_along(scenario):

@@ -176,7 +176,7 @@ def test_a_benchmark_must_be_named_and_known(capsys):
 
 def test_costs_are_drawn_part_by_part(tmp_path):
     pytest.importorskip("matplotlib")
-    costs = [Cost(regime, 3.0, dict.fromkeys(PARTS, 50.0), 40.0, 3.1) for regime in ("free", "wiping")]
+    costs = [Cost(regime, 3.0, dict.fromkeys(PARTS, 50.0), 40.0, 3.1, 126.0) for regime in ("free", "wiping")]
     made = PLOTS["control"](tmp_path, [costs])
     assert [path.name for path in made] == ["control.png"]
     assert made[0].stat().st_size > 5000
@@ -192,7 +192,7 @@ def test_every_benchmark_has_what_the_command_asks_of_it():
 
 
 def test_of_three_runs_the_one_in_the_middle_is_told():
-    runs = [[Cost("wiping", 3.0, dict.fromkeys(PARTS, 50.0), 40.0, factor)] for factor in (3.5, 2.0, 3.1)]
+    runs = [[Cost("wiping", 3.0, dict.fromkeys(PARTS, 50.0), 40.0, factor, 126.0)] for factor in (3.5, 2.0, 3.1)]
     assert [cost.real_time for cost in control.middle(runs)] == [3.1]
     assert {check.figure: check.reached for check in control.acceptance(runs)}["wiping: real-time factor"]
 

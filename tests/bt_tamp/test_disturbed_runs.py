@@ -2,11 +2,13 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from bt_tamp.cli import main
 from bt_tamp.disturb.classes import KINDS, amended
 from bt_tamp.disturb.names import CLASSES, can_be_reached, chosen
+from bt_tamp.report.film import Filming, Recording, Shot
 from bt_tamp.report.result import RunResult
 from scenarios.library import scenario_path
 from scenarios.load import load_scenario
@@ -16,6 +18,7 @@ disturbances:
   - {at: 0.1, move: {object: cube, by: [0.0, 0.03, 0.0]}}
   - {at: 0.2, take: {object: sponge}}
   - {phase: pre-grasp, push: {force: [100, 0, 0], seconds: 0.1}}
+  - {at: 0.6, shift: {region: left_bin, by: [0.05, 0.10, 0.0]}}
   - {at: 1.2, bring: {object: sponge}}
   - {at: 1.4, goal: "(in_bin sponge left_bin)"}
 """
@@ -75,12 +78,22 @@ def test_the_story_tells_what_was_done(declared, capsys):
 
 
 def test_the_film_shows_what_was_there(declared, tmp_path):
-    from bt_tamp.report.film import Filming, Recording, Shot
-
     with Filming(Recording.load(declared / "one")) as filming:
         assert (filming.take(Shot(0.15, 1.0)) != filming.take(Shot(0.8, 1.0))).any()
     captions = Recording.load(declared / "one").timeline.notes
     assert any("sponge was taken away" in words for note in captions for words in note.sentences)
+
+
+def test_the_film_shows_a_bin_where_it_was_shifted_to(declared):
+    recording = Recording.load(declared / "one")
+    before, after = (recording.scene_at(t).regions["left_bin"].X_WR.translation for t in (0.5, 0.8))
+    assert after - before == pytest.approx([0.05, 0.10, 0.0])
+    with Filming(recording) as filming:
+        still, moved = (filming.take(Shot(t, 1.0)) for t in (0.5, 0.8))
+        corners = np.array([[x, y, 0.06] for x in (-0.17, 0.17) for y in (-0.17, 0.17)]) + after
+        spots = filming.backdrop.camera.project(corners)[:, :2].round().astype(int)
+    changed = [(moved[y - 3 : y + 3, x - 3 : x + 3] != still[y - 3 : y + 3, x - 3 : x + 3]).any() for x, y in spots]
+    assert all(changed)
 
 
 @pytest.mark.parametrize("name", ["push", "new-object", "task-planner"])

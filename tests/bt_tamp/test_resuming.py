@@ -1,6 +1,10 @@
 """Going on from where another run ended."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 
 import pytest
 
@@ -51,3 +55,21 @@ def test_a_folder_without_a_state_is_refused(tmp_path, capsys):
     (tmp_path / "events.jsonl").write_text("")
     assert main(["run", "--resume", str(tmp_path)]) == 2
     assert "scenario.json" in capsys.readouterr().err
+
+
+def test_a_run_that_was_killed_goes_on_from_its_last_action(tmp_path):
+    folder = tmp_path / "run"
+    command = [sys.executable, "-m", "bt_tamp", "run", "fig2", "--out", str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
+        while run.poll() is None:
+            events = folder / "events.jsonl"
+            if events.is_file() and '"action_done"' in events.read_text():
+                run.send_signal(signal.SIGKILL)
+            time.sleep(0.02)
+    assert run.returncode == -signal.SIGKILL
+    assert not (folder / "result.json").exists()
+    assert not list(folder.glob(".state*"))
+    assert RunState.from_json((folder / "state.json").read_text()).held == "sponge"
+    again = tmp_path / "again"
+    assert main(["run", "--resume", str(folder), "--max-sim-time", "0.6", "--out", str(again)]) == 12
+    assert json.loads((again / "result.json").read_text())["plan"][0].startswith("wipe")

@@ -1,5 +1,10 @@
 import json
 import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -102,3 +107,41 @@ def test_a_sweep_stores_real_runs_and_goes_on_only_when_told_to(
     assert "--resume" in capsys.readouterr().err
     assert main([*sweep, "--resume"]) == 0
     assert "fig2, seed 1: gave up" in capsys.readouterr().out
+
+
+def test_a_sweep_that_was_killed_leaves_no_process_and_goes_on_without_losing_or_repeating_a_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "s.db"
+    sweep = ["sweep", "fig2", "--seeds", "0:3", "--jobs", "1", "--max-sim-time", "0.3", "--store", str(path)]
+    with subprocess.Popen([sys.executable, "-m", "bt_tamp", *sweep], stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline().startswith("1/3")
+        workers = children(process.pid)
+        process.send_signal(signal.SIGKILL)
+    before = stored_at(path)
+    assert workers
+    wait_for_the_end_of(workers)
+    assert main([*sweep, "--resume"]) == 0
+    after = stored_at(path)
+    assert [seed for seed, _ in after] == [0, 1, 2]
+    assert 0 < len(before) < 3
+    assert after[: len(before)] == before
+
+
+def children(pid: int) -> list[int]:
+    found = subprocess.run(["pgrep", "-P", str(pid), "-f", "Loky"], capture_output=True, text=True, check=False)
+    return [int(line) for line in found.stdout.split()]
+
+
+def wait_for_the_end_of(pids: list[int]) -> None:
+    for _ in range(400):
+        if not any(Path(f"/proc/{pid}").exists() for pid in pids):
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"{pids} outlive their sweep")
+
+
+def stored_at(path: Path) -> list[tuple[int, str]]:
+    with sqlite3.connect(path) as connection:
+        return connection.execute("SELECT seed, stored_at FROM runs ORDER BY seed").fetchall()
