@@ -6,7 +6,7 @@ import numpy as np
 
 from bt_tamp.disturb.deed import Deed, Later, Occasion
 from bt_tamp.disturb.disorders import disordered
-from bt_tamp.disturb.world import moved
+from bt_tamp.disturb.world import DROPPING, moved
 from scenarios.names import Disordered
 from sim.robot_faults import Push, WeakGrip
 
@@ -28,7 +28,7 @@ def push(now: Occasion) -> Deed:
 
 def weak_grip(now: Occasion) -> Deed | None:
     """The fingers lose their force for half a second, over something that catches what is held."""
-    if now.held is None or not now.falls_within_reach(WEAK):
+    if now.held is None or not now.falls_within_reach(WEAK + DROPPING):
         return None
     fault = WeakGrip(start=now.t, end=now.t + WEAK, force=0.5)
     return Deed("the gripper lost its force for 0.5 s", (fault,), names=(now.held,), loosens=True)

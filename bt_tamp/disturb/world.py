@@ -29,6 +29,9 @@ STRAY = 0.05
 SLIPPERY = 1.0
 """Seconds for which something slips."""
 
+DROPPING = 1.0
+"""Seconds after which, at most, what has slipped in the hand falls from it."""
+
 AWAY = (2.0, 5.0)
 """Seconds for which something is gone."""
 
@@ -149,7 +152,7 @@ def knocked_from_hand(now: Occasion) -> Deed | None:
 def slipping(now: Occasion) -> Deed | None:
     """What is held turns slippery for a while, over something that catches it."""
     name = now.held
-    if name is None or not now.falls_within_reach(SLIPPERY):
+    if name is None or not now.falls_within_reach(SLIPPERY + DROPPING):
         return None
     fault = Slippery(start=now.t, end=now.t + SLIPPERY, name=name, friction=0.002)
     return Deed(f"{name} turned slippery in the hand for 1 s", (fault,), names=(name,), loosens=True)

@@ -73,7 +73,8 @@ class Filming:
         self.recording = recording
         self.backdrop = backdrop or backdrop_of(recording.scenario)
         self._renderer = Renderer(recording.scenario, self.backdrop, engine)
-        self._scenario, self._engine = recording.scenario, engine
+        self._scenario = recording.scenario
+        self._engine: Engine | None = engine
         self._hands = frozenset(RobotModel.links)
 
     def __enter__(self) -> "Filming":

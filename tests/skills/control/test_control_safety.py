@@ -231,4 +231,4 @@ def test_a_tare_under_noise_and_delay_leaves_a_tenth_of_a_newton(lab):
 
 def test_reasons_are_plain_values():
     assert replace(TooFast(1.0, 2.0), speed=1.5) == TooFast(1.5, 2.0)
-    assert str(SensorLost(0.022)) == "the wrist sensor has been silent for 22 ms"
+    assert str(SensorLost(0.022)) == "the wrist sensor has told nothing new for 22 ms"
