@@ -35,7 +35,7 @@ from planner.motion.tables import (
 _part = njit(inline="always")
 """Written into its callers."""
 
-_lean = njit(cache=True, _nrt=False)
+_lean = njit(cache=True, _nrt=False)  # pyright: ignore[reportCallIssue] - not in its declared arguments
 """Counts no references to the arrays that it handles, which takes most of the time otherwise, and can make none."""
 
 _ONE_EACH = np.arange(9.0)
