@@ -35,7 +35,7 @@ from planner.motion.tables import (
 _part = njit(inline="always")
 """Written into its callers."""
 
-_lean = njit(cache=True, _nrt=False)
+_lean = njit(cache=True, _nrt=False)  # pyright: ignore[reportCallIssue] - not in its declared arguments
 """Counts no references to the arrays that it handles, which takes most of the time otherwise, and can make none."""
 
 _ONE_EACH = np.arange(9.0)
@@ -51,14 +51,16 @@ def place_links(q, base, joints, links):
         links[0, i] = base[i]
     for k in range(7):
         c, s = np.cos(q[k]), np.sin(q[k])
+        # Read before anything is written: the compiler can't know that `links` isn't `joints`.
+        a0, a1, a2, b0, b1, b2 = joints[k, 0], joints[k, 3], joints[k, 6], joints[k, 1], joints[k, 4], joints[k, 7]
+        c0, c1, c2, p0, p1, p2 = joints[k, 2], joints[k, 5], joints[k, 8], joints[k, 9], joints[k, 10], joints[k, 11]
         for r in range(3):
-            x, y, z = links[k, 3 * r], links[k, 3 * r + 1], links[k, 3 * r + 2]
-            along = x * joints[k, 0] + y * joints[k, 3] + z * joints[k, 6]
-            across = x * joints[k, 1] + y * joints[k, 4] + z * joints[k, 7]
+            x, y, z, o = links[k, 3 * r], links[k, 3 * r + 1], links[k, 3 * r + 2], links[k, 9 + r]
+            along, across = x * a0 + y * a1 + z * a2, x * b0 + y * b1 + z * b2
             links[k + 1, 3 * r] = c * along + s * across
             links[k + 1, 3 * r + 1] = c * across - s * along
-            links[k + 1, 3 * r + 2] = x * joints[k, 2] + y * joints[k, 5] + z * joints[k, 8]
-            links[k + 1, 9 + r] = links[k, 9 + r] + x * joints[k, 9] + y * joints[k, 10] + z * joints[k, 11]
+            links[k + 1, 3 * r + 2] = x * c0 + y * c1 + z * c2
+            links[k + 1, 9 + r] = o + x * p0 + y * p1 + z * p2
 
 
 @njit(cache=True)
@@ -83,11 +85,15 @@ def _place_points(links, row, points, placed):
 def _place_spheres(links, spheres, first, placed):
     """Write `placed`: the spheres (n,4), those from first[k] on given in the frame of links[k], in W."""
     for k in range(links.shape[0]):
+        # Read before anything is written, as above.
+        a0, a1, a2, b0, b1, b2 = links[k, 0], links[k, 1], links[k, 2], links[k, 3], links[k, 4], links[k, 5]
+        c0, c1, c2, p0, p1, p2 = links[k, 6], links[k, 7], links[k, 8], links[k, 9], links[k, 10], links[k, 11]
         for i in range(int(first[k]), int(first[k + 1])):
-            for r in range(3):
-                turned = links[k, 3 * r] * spheres[i, 0] + links[k, 3 * r + 1] * spheres[i, 1]
-                placed[i, r] = links[k, 9 + r] + turned + links[k, 3 * r + 2] * spheres[i, 2]
-            placed[i, 3] = spheres[i, 3]
+            x, y, z, radius = spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3]
+            placed[i, 0] = p0 + (a0 * x + a1 * y) + a2 * z
+            placed[i, 1] = p1 + (b0 * x + b1 * y) + b2 * z
+            placed[i, 2] = p2 + (c0 * x + c1 * y) + c2 * z
+            placed[i, 3] = radius
 
 
 @_part

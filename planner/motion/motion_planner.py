@@ -1,8 +1,8 @@
 """What skills ask about motion: inverse kinematics, straight lines, collision-free moves, and their timing."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from pinocchio import SE3
@@ -36,6 +36,8 @@ DEEPEST = -0.004
 _CONTROL_SPACINGS = (0.3, 0.1)
 _ATTEMPTS = 3
 _RECENT = 12
+
+_Model = TypeVar("_Model", bound=CollisionChecker)
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class MotionPlanner:
         self._seed, self._queries = seed, 0
         self._ik = ClosedFormIK(robot)
         self._limits = np.stack([robot.q_min, robot.q_max])
-        self._recent: list[tuple[SceneState, Margins, ExactChecker]] = []
+        self._recent_exact, self._recent_fast = _Recent(ExactChecker), _Recent(FastChecker)
 
     def free(
         self, scene: SceneState, q: np.ndarray, allowed: frozenset[Pair] = NOTHING, margin: float | None = None
@@ -221,7 +223,8 @@ class MotionPlanner:
     ) -> Ends | MotionFailure:
         """Which of the goals (7,) a move from scene.q may have, with which margins, or why there is none."""
         margins = Margins(self.settings.margin, allowed)
-        near = self._near(scene, scene.q, margins)
+        # What the fast model calls free is free, and it is asked at once.
+        near = [] if self._surely_free(scene, scene.q, margins) else self._near(scene, scene.q, margins)
         deep = [contact for contact in near if contact.distance < DEEPEST]
         if deep:
             return blame("the arm starts in collision:", deep, movables(scene))
@@ -243,7 +246,7 @@ class MotionPlanner:
         within = [q for q in q_goals if np.all(q >= self._limits[0]) and np.all(q <= self._limits[1])]
         if not within:
             return MotionFailure("every goal lies beyond a joint limit" if len(q_goals) else "no goal was given")
-        hits = [self._contacts(scene, q[None], margins) for q in within]
+        hits = [[] if self._surely_free(scene, q, margins) else self._contacts(scene, q[None], margins) for q in within]
         goals = [q for q, contacts in zip(within, hits, strict=True) if not contacts]
         if goals:
             return goals
@@ -252,18 +255,19 @@ class MotionPlanner:
 
     def _polyline(self, scene: SceneState, ends: Ends, seed: int, max_checks: int) -> np.ndarray | None:
         checker, reached = self._checker(scene, ends)
+        before = checker.checks
         path = next((np.stack([scene.q, q]) for q in reached if checker.edge_is_free(scene.q, q)), None)
         if path is None:
             query = Query(scene.q, reached, self._limits, seed, max_checks)
             path = plan_path(query, checker, self._path_settings, lambda: enclosed_end(checker, query) is not None)
             if path is not None:
                 path = shortened(path, checker, np.random.default_rng(seed))
-        self.work.add("checks" if isinstance(checker, FastChecker) else "exact_checks", checker.checks)
+        self.work.add("checks" if isinstance(checker, FastChecker) else "exact_checks", checker.checks - before)
         return path
 
     def _checker(self, scene: SceneState, ends: Ends) -> tuple[CollisionChecker, list[np.ndarray]]:
         """The fast model with the goals it accepts; the exact one if the fast refuses the start or every goal."""
-        fast = FastChecker(self.robot, scene, ends.margins)
+        fast = self._fast(scene, ends.margins)
         accepted = [q for q in ends.goals if fast.is_free(q)]
         if accepted and fast.is_free(scene.q):
             return fast, accepted
@@ -288,9 +292,9 @@ class MotionPlanner:
     def _walled_in(self, scene: SceneState, ends: Ends, seed: int) -> MotionFailure | None:
         """What there is no way out of, at the start or at every goal."""
         checker, reached = self._checker(scene, ends)
-        query = Query(scene.q, reached, self._limits, seed, 0)
+        before, query = checker.checks, Query(scene.q, reached, self._limits, seed, 0)
         end = enclosed_end(checker, query)
-        self.work.add("checks", checker.checks)
+        self.work.add("checks", checker.checks - before)
         if end is None:
             return None
         which, q = end
@@ -330,12 +334,31 @@ class MotionPlanner:
         self.work.add("exact_checks", len(dense))
         return checker.contacts(dense, enough=movables(scene).isdisjoint)
 
+    def _surely_free(self, scene: SceneState, q: np.ndarray, margins: Margins) -> bool:
+        self.work.add("checks")
+        return self._fast(scene, margins).is_free(q)
+
+    def _fast(self, scene: SceneState, margins: Margins) -> FastChecker:
+        return self._recent_fast.of(self.robot, scene, margins)
+
     def _exact(self, scene: SceneState, margins: Margins) -> ExactChecker:
-        for known, limits, checker in self._recent:
+        return self._recent_exact.of(self.robot, scene, margins)
+
+
+class _Recent(Generic[_Model]):
+    """The collision models that were asked for last."""
+
+    def __init__(self, make: Callable[[RobotModel, SceneState, Margins], _Model]) -> None:
+        self._make = make
+        self._known: list[tuple[SceneState, Margins, _Model]] = []
+
+    def of(self, robot: RobotModel, scene: SceneState, margins: Margins) -> _Model:
+        """The model of this very scene with these margins."""
+        for known, limits, checker in self._known:
             if known is scene and limits == margins:
                 return checker
-        checker = ExactChecker(self.robot, scene, margins)
-        self._recent = [(scene, margins, checker), *self._recent[: _RECENT - 1]]
+        checker = self._make(robot, scene, margins)
+        self._known = [(scene, margins, checker), *self._known[: _RECENT - 1]]
         return checker
 
 
