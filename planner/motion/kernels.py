@@ -35,9 +35,6 @@ from planner.motion.tables import (
 _part = njit(inline="always")
 """Written into its callers."""
 
-_lean = njit(cache=True, _nrt=False)  # pyright: ignore[reportCallIssue] - not in its declared arguments
-"""Counts no references to the arrays that it handles, which takes most of the time otherwise, and can make none."""
-
 _ONE_EACH = np.arange(9.0)
 
 ROOM = 0.1
@@ -285,7 +282,7 @@ def _between(qa, qb, fraction, q):
         q[k] = qa[k] + (qb[k] - qa[k]) * fraction
 
 
-@_lean
+@njit(cache=True)
 def _edge_steps(qa, qb, arm, links, q, places, joint_step, travel_step):
     """Number of equal steps from qa to qb of at most `joint_step` rad a joint and about `travel_step` metres of
     the hand (its chords over both halves of the edge, a tenth added). places (3,n,3): workspace."""
@@ -307,7 +304,7 @@ def _edge_steps(qa, qb, arm, links, q, places, joint_step, travel_step):
     return max(1, int(np.ceil(widest / joint_step)), int(np.ceil(travel / travel_step)))
 
 
-@_lean
+@njit(cache=True)
 def _blocked(qa, qb, arm, scene, done, links, q, spheres, covers, solids, twists, gaps, way, bends, relative):
     """Configurations checked on the edge, less than 0 if the last was in collision. done (n+1,): those of its n+1
     configurations that needn't be checked; the arrays after it are workspaces."""
