@@ -36,7 +36,12 @@ SEAM = 0.0005
 TIP = 0.012
 """Metres from the fingertips to where they touch."""
 
-APPROACH_STEP = np.radians(20.0)
+LEAST_TIP = 0.003
+TIP_CLEARANCE = 0.004
+"""Metres that the fingertips stay short of where the material ends, and what it lies on may begin."""
+
+APPROACH_STEP = np.radians(18.0)
+"""A fraction of a right angle: what lies on one of its sides is grasped squarely from above."""
 PATCH = 0.006
 """Metres about a point of contact within which the surface should go on."""
 
@@ -81,7 +86,7 @@ def antipodal_grips(shape: Hull | Compound, gripper: Gripper) -> Grips:
     standing = placed_rows(convex_parts(shape))
     R, p, width, cost = [], [], [], []
     for pair in pairs[:MOST]:
-        hands = _hands(pair)
+        hands = _hands(solids, pair)
         has_room = clear_of(_moving(pair, gripper), np.array([placement(X) for X in hands]), standing)
         for X_OG in (X for X, free in zip(hands, has_room, strict=True) if free):
             for R_OG in (X_OG.rotation, X_OG.rotation @ np.diag([-1.0, -1.0, 1.0])):
@@ -223,7 +228,7 @@ def _distinct(pairs: list[_Pair]) -> list[_Pair]:
     return [pairs[k] for k in kept]
 
 
-def _hands(pair: _Pair) -> list[SE3]:
+def _hands(solids: _Solids, pair: _Pair) -> list[SE3]:
     """Poses X_OG of the hand all round the closing line."""
     x, w = _square_to(pair.closing)
     found = []
@@ -231,7 +236,10 @@ def _hands(pair: _Pair) -> list[SE3]:
         approach = np.cos(angle) * x + np.sin(angle) * w
         across = np.cos(angle) * w - np.sin(angle) * x
         R_OG = np.column_stack([across, pair.closing, approach])
-        found.append(SE3(R_OG, pair.middle + TIP * approach))
+        left = next(
+            (leave for enter, leave, *_ in solids.crossings(pair.middle, approach) if enter <= 0.0 <= leave), TIP
+        )
+        found.append(SE3(R_OG, pair.middle + min(TIP, max(LEAST_TIP, left - TIP_CLEARANCE)) * approach))
     return found
 
 

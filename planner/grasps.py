@@ -6,7 +6,7 @@ turned about their axes of symmetry. Hulls and compounds are left to `antipodal`
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -25,6 +25,16 @@ between the pads, or less where something stands close."""
 MIN_DEPTH = 0.02
 TIP_CLEARANCE = 0.012
 """Metres that the fingertips stay short of the object's far side, where what it lies on may be."""
+
+LEAST_CLEARANCE = 0.004
+CLEARED = 0.3
+"""Of something thin, the part of its thickness that they stay short of, but at least LEAST_CLEARANCE metres."""
+
+LEAST_DEPTH = 0.009
+"""Metres that the fingers reach over a thin object at least: less doesn't keep it from tilting."""
+
+LYING = 0.7
+"""Cosine of the angle between a cylinder's axis and the vertical below which it lies rather than stands."""
 
 SIDE_STEP = 0.02
 JITTER = 0.02
@@ -63,7 +73,7 @@ def grasps(shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.
 
     Ends when all are given. `rng` breaks ties, so that another seed tries another order.
     """
-    found = _candidates(shape, gripper)
+    found = _turned(_candidates(shape, gripper), _levelling(shape, X_WO.rotation))
     approach = found.R[:, :, 2] @ X_WO.rotation.T
     outward = (X_WO.translation - base) * np.array([1.0, 1.0, 0.0])
     outward = outward / max(float(np.linalg.norm(outward)), 1e-6)
@@ -87,6 +97,21 @@ def tool_grasps(
         approach_W = X_WO.rotation @ grasp.X_OG.rotation[:, 2]
         if abs(closing[longest]) > 0.99 and approach_W[2] < -0.99:
             yield grasp
+
+
+def _levelling(shape: Shape, R_WO: np.ndarray) -> np.ndarray:
+    """Rotation (3,3), about an axis of symmetry, after which something round that has rolled is grasped squarely from
+    above as if it had not."""
+    match shape:
+        case Sphere():
+            return R_WO.T
+        case Cylinder() if abs(R_WO[2, 2]) < LYING:
+            return pin.rpy.rpyToMatrix(0.0, 0.0, float(np.arctan2(R_WO[2, 1], R_WO[2, 0])))
+    return np.eye(3)
+
+
+def _turned(grips: Grips, R: np.ndarray) -> Grips:
+    return replace(grips, R=R @ grips.R, p=grips.p @ R.T)
 
 
 @lru_cache(maxsize=256)
@@ -130,8 +155,9 @@ def _box_grasps(size: np.ndarray, gripper: Gripper) -> Iterator[tuple[np.ndarray
             lateral = s * axes[first] - c * axes[second]
             hands = [np.array([-sign * lateral, sign * closing, approach]).T for sign in (1.0, -1.0)]
             for side, entry, exit_ in _lines_through((float(size[first]), float(size[second])), (c, s)):
-                for depth in sorted({min(depth, exit_ - entry - TIP_CLEARANCE) for depth in DEPTHS}):
-                    if depth < min(MIN_DEPTH, 0.6 * (exit_ - entry)):
+                clearance = min(TIP_CLEARANCE, max(LEAST_CLEARANCE, CLEARED * (exit_ - entry)))
+                for depth in sorted({min(depth, exit_ - entry - clearance) for depth in DEPTHS}):
+                    if depth < max(LEAST_DEPTH, min(MIN_DEPTH, 0.6 * (exit_ - entry))):
                         continue
                     position = lateral * side + approach * (entry + depth)
                     for R_FG in hands:

@@ -10,7 +10,7 @@ import pybullet as p
 import pybullet_data
 from pinocchio import SE3
 
-from scenarios.shapes import Shape
+from scenarios.shapes import Cylinder, Shape
 from sim.bullet_shapes import add_collision_shape, add_visual_shape, principal_axes
 from sim.robot import RobotModel
 
@@ -19,6 +19,9 @@ Color = tuple[float, float, float, float]
 ROTATION_DAMPING = 2.0
 """1/s at which a thing's turning dies away: without it a glass on its rim or a ball never come to rest. Bullet's own
 rolling friction does it too, but doubles the cost of every contact."""
+
+ROLLING_FRICTION = 1e-4
+"""Metres: a cylinder's resistance to rolling. Without it Bullet has one that lies at rest roll off at 8 mm/s."""
 
 ASLEEP = 1e-6
 """(m/s)² plus (rad/s)² below which, for two seconds, a thing is left out of the sums until something touches it or what
@@ -58,6 +61,7 @@ def add_body(shape: Shape, X_WO: SE3, matter: tuple[float, float], color: Color,
         lateralFriction=friction,
         restitution=0.0,
         linearDamping=0.0,
+        rollingFriction=ROLLING_FRICTION if isinstance(shape, Cylinder) else 0.0,
         angularDamping=ROTATION_DAMPING,
         activationState=p.ACTIVATION_STATE_ENABLE_SLEEPING,
         sleepThreshold=ASLEEP,

@@ -13,6 +13,7 @@ from pinocchio import SE3
 from planner.failure import Blocked, MotionFailure, RefinementFailure
 from planner.refinement import Phase, pairs
 from planner.stability import room_about, tops
+from planner.support import supports
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Body, Scenario, Table
 from scenarios.shapes import Compound, Cylinder, Hull, Sphere, extents, middle
@@ -121,6 +122,11 @@ def ways_of_pressing(toolkit: Toolkit, action: GroundAction, scene: SceneState) 
     body = scene.scenario.bodies[name]
     if not has_level_top(body, scene.poses[name]):
         reason = f"{name} has no level top to press on"
+        return RefinementFailure(action, reason, (Blocked(None, reason),))
+    beneath = supports(scene, name)
+    if beneath:
+        # What it lies on would come along, or it would fall off.
+        reason = f"{name} lies on {', '.join(sorted(beneath))}, not on the table"
         return RefinementFailure(action, reason, (Blocked(None, reason),))
     needed = needed_force(body, scene.scenario.table, toolkit.robot.gripper.pad_friction)
     if needed is None:

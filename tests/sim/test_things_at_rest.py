@@ -9,7 +9,7 @@ from pinocchio import SE3
 
 from scenarios.load import load_scenario
 from scenarios.scenario import Body
-from scenarios.shapes import Box
+from scenarios.shapes import Box, Cylinder
 from sim.bullet import BulletPlant
 from sim.plant import Command, GripCommand
 from sim.robot import RobotModel
@@ -67,3 +67,14 @@ def test_what_is_struck_moves(stack):
     stack.put("lower", SE3(tilted, before + np.array([0.0, 0.04, 0.1])))
     wait(stack, 0.6)
     assert np.linalg.norm(spot(stack, "upper") - before) > 0.01
+
+
+def test_a_cylinder_that_lies_does_not_roll_off_by_itself():
+    scenario = load_scenario("fig1", 0)
+    radius = 0.011
+    lying = SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0.0, 0.6), np.array([0.6, 0.1, 0.05 + radius]))
+    rod = Body("rod", Cylinder(radius, 0.24), 0.06, 0.6, (1.0, 0.0, 0.0, 1.0), lying)
+    plant = BulletPlant(replace(scenario, bodies={"rod": rod}), RobotModel())
+    wait(plant, 2.0)
+    assert np.linalg.norm(spot(plant, "rod") - lying.translation) < 1e-3
+    plant.close()

@@ -282,3 +282,15 @@ def test_walls_along_all_edges_are_named_as_what_keeps_an_object_from_being_drag
     assert isinstance(failure, RefinementFailure)
     assert "wall_" in failure.reason
     assert not failure.culprit_sets
+
+
+def test_what_lies_on_something_else_is_not_dragged_off_it():
+    scene = scene_with("book", "box")
+    base = replace(scene.bodies["box"], shape=Box((0.18, 0.24, 0.02)), X_WO=SE3(np.eye(3), np.array([0.6, 0.1, 0.06])))
+    scene = with_book(scene, X_WO=SE3(np.eye(3), np.array([0.6, 0.1, 0.085])))
+    bench = Bench(replace(scene, bodies={**scene.bodies, "box": base}))
+    for name in ("drag", "drag_aside"):
+        failure = bench.refine(action(f"{name}(book, table)"))
+        assert isinstance(failure, RefinementFailure)
+        assert failure.reason == "book lies on box, not on the table"
+        assert not failure.culprit_sets

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from bench import Bench, action, scene_with, with_pose
 from pinocchio import SE3
@@ -10,6 +11,7 @@ from py_trees.common import Status
 
 from planner.failure import RefinementFailure
 from planner.task.facts import place_of
+from scenarios.shapes import Box, Cylinder, Hull, reach
 
 
 @pytest.mark.parametrize(("x", "y", "yaw"), [(0.68, -0.08, 0.0), (0.55, 0.2, 0.6)])
@@ -90,3 +92,21 @@ def test_what_is_out_of_reach_or_too_heavy_is_proven_so():
     assert isinstance(failure, RefinementFailure)
     assert failure.proof == "anywhere"
     assert "30.00 kg" in failure.reason
+
+
+def _octagonal_rod(radius: float, length: float) -> Hull:
+    around = np.radians(22.5 + 45.0 * np.arange(8))
+    rim = radius / np.cos(np.radians(22.5)) * np.column_stack([np.cos(around), np.sin(around)])
+    return Hull.of(np.array([[x, y, z] for x, y in rim for z in (0.0, length)]))[0]
+
+
+@pytest.mark.parametrize("rod", [Cylinder(0.011, 0.24), Box((0.016, 0.014, 0.24)), _octagonal_rod(0.011, 0.24)])
+def test_a_thin_rod_is_taken_up_from_where_it_lies(rod):
+    scene = scene_with("box")
+    R = pin.rpy.rpyToMatrix(np.pi / 2, 0.0, 0.6)
+    height = 0.05 + reach(rod, R.T @ np.array([0.0, 0.0, -1.0]))
+    lying = replace(scene.bodies["box"], shape=rod, mass=0.06, X_WO=SE3(R, np.array([0.6, 0.1, height])))
+    bench = Bench(replace(scene, bodies={"box": lying}))
+    assert bench.do("pick(box, table)") is Status.SUCCESS
+    assert bench.do("place(box, right_bin)") is Status.SUCCESS
+    assert place_of(bench.scene, "box") == "right_bin"
