@@ -22,9 +22,15 @@ def supports(scene: SceneState, name: str) -> frozenset[str]:
 
 def burden(scene: SceneState, name: str) -> frozenset[str]:
     """Bodies that stand on a body, or on what stands on it."""
+    return _burden(Standing(scene), name)
+
+
+@lru_cache(maxsize=512)
+def _burden(standing: Standing, name: str) -> frozenset[str]:
+    others = [other for other, _ in standing.poses]
     found = frozenset({name})
-    for _ in scene.poses:
-        more = found | {other for other in scene.poses if supports(scene, other) & found}
+    for _ in others:
+        more = found | {other for other in others if _supports(standing, other) & found}
         if more == found:
             break
         found = more

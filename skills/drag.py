@@ -143,7 +143,8 @@ class Drag:
             return pressings
         search = _Search(self._kit, self._pick, action, scene, rng)
         samples = search.pulls(body, in_order(pressings, hints)[0])
-        outcome = refine_by_sampling(action, scene, samples, search.attempt, budget, hints)
+        nothing = f"{body.name} offers the fingertips no room, or comes to no edge within the arm's reach"
+        outcome = refine_by_sampling(action, scene, samples, search.attempt, budget, hints, nothing)
         if isinstance(outcome, RefinementFailure) and search.second_best is not None:
             return search.second_best
         return outcome
@@ -190,7 +191,10 @@ class _Search:
     def pulls(self, body: Body, pressing: Pressing) -> Iterator[Pull]:
         """Samples, the edges by way and by how often they have failed."""
         scene = self.scene
-        left = [entries[::-1] for entries in ends(body, scene.poses[body.name], scene.scenario.table, self.rng)]
+        found = ends(body, scene.poses[body.name], scene.scenario.table, self.rng)
+        left = [
+            [(cost, end) for cost, end in reversed(entries) if self._is_within_reach(body, end)] for entries in found
+        ]
         while any(left):
             edge = min(
                 (edge for edge in range(4) if left[edge]),
@@ -202,6 +206,10 @@ class _Search:
                 if end in self._hopeless:
                     break
             self._failures[edge] += 1
+
+    def _is_within_reach(self, body: Body, end: End) -> bool:
+        X_WO_end = end.pose(body, self.scene.poses[body.name], self.scene.scenario.table)
+        return beyond_reach(self.kit, self.action, self.scene.moved(body.name, X_WO_end)) is None
 
     def attempt(self, pull: Pull, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
         """The motion of one sample, or why there is none."""

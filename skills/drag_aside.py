@@ -87,7 +87,8 @@ class DragAside:
             return self._attempt(action, shift, world)
 
         samples = self._shifts(action.args[0], scene, in_order(pressings, hints)[0], rng)
-        return refine_by_sampling(action, scene, samples, attempt, budget, hints)
+        nothing = f"{action.args[0]} offers the fingertips no room, or there is none beside it"
+        return refine_by_sampling(action, scene, samples, attempt, budget, hints, nothing)
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
         name = refinement.action.args[0]

@@ -147,10 +147,11 @@ def press_pose(body: Body, X_WO: SE3, way: np.ndarray, tips: Tips) -> SE3:
     return SE3(pin.rpy.rpyToMatrix(np.pi, 0.0, tips.yaw), p_WG)
 
 
-def tip_points(X_WG: SE3, gripper: Gripper) -> list[np.ndarray]:
-    """The corners (3,) of the patch that the closed fingertips cover, in W."""
+def tip_points(X_WG: SE3, gripper: Gripper) -> np.ndarray:
+    """The corners (4,3) of the patch that the closed fingertips cover, in W."""
     x, y = gripper.pad[0] / 2, gripper.pad[1]
-    return [X_WG.act(np.array([sx * x, sy * y, 0.0])) for sx in (-1.0, 1.0) for sy in (-1.0, 1.0)]
+    corners = np.array([[-x, -y, 0.0], [-x, y, 0.0], [x, -y, 0.0], [x, y, 0.0]])
+    return corners @ X_WG.rotation.T + X_WG.translation
 
 
 def has_level_top(body: Body, X_WO: SE3) -> bool:
@@ -166,15 +167,16 @@ def has_level_top(body: Body, X_WO: SE3) -> bool:
             return float(np.abs(X_WO.rotation[2]).max()) > LEVEL
 
 
-def is_on_top(body: Body, X_WO: SE3, points: list[np.ndarray]) -> bool:
-    """Do points of W lie over the object's top, inside its rim?"""
+def is_on_top(body: Body, X_WO: SE3, points: np.ndarray) -> bool:
+    """Do points (n,3) of W lie over the object's top, inside its rim?"""
+    points_O = (points - X_WO.translation) @ X_WO.rotation
     if isinstance(body.shape, Hull | Compound):
-        points_O = [X_WO.actInv(point) for point in points]
         faces = tops(body.shape, X_WO.rotation[2], LEVEL)
         return any(min(room_about(*face, point) for point in points_O) >= TIP_MARGIN for face in faces)
     up = int(np.argmax(np.abs(X_WO.rotation[2])))
-    half = np.delete(extents(body.shape), up) / 2 - TIP_MARGIN
-    offsets = np.array([np.delete(X_WO.actInv(point), up) for point in points])
+    level = [axis for axis in range(3) if axis != up]
+    half = extents(body.shape)[level] / 2 - TIP_MARGIN
+    offsets = points_O[:, level]
     if isinstance(body.shape, Cylinder):
         return bool(np.hypot(*offsets.T).max() <= half.min())
     return bool(np.all(np.abs(offsets) <= half))

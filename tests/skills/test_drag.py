@@ -257,11 +257,11 @@ def test_only_the_highest_flat_faces_are_pressed_on():
     )
     body, X_WO = lying(flat).bodies["book"], SE3.Identity()
     assert has_level_top(body, X_WO)
-    assert is_on_top(body, X_WO, [np.array([0.06, 0.09, 0.0])])
-    assert not is_on_top(body, X_WO, [np.array([0.07, 0.09, 0.0])]), "over the slope beside the top"
+    assert is_on_top(body, X_WO, np.array([[0.06, 0.09, 0.0]]))
+    assert not is_on_top(body, X_WO, np.array([[0.07, 0.09, 0.0]])), "over the slope beside the top"
     with_knob = replace(body, shape=knobbed)
-    assert is_on_top(with_knob, X_WO, [np.array([0.01, 0.0, 0.0])])
-    assert not is_on_top(with_knob, X_WO, [np.array([0.05, 0.0, 0.0])]), "beside the knob"
+    assert is_on_top(with_knob, X_WO, np.array([[0.01, 0.0, 0.0]]))
+    assert not is_on_top(with_knob, X_WO, np.array([[0.05, 0.0, 0.0]])), "beside the knob"
     roof = Hull.of(
         np.array([(x, y, 0.0) for x in (-0.05, 0.05) for y in (-0.05, 0.05)] + [(0.0, y, 0.04) for y in (-0.05, 0.05)])
     )[0]
