@@ -89,9 +89,11 @@ def grasps(shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.
 def tool_grasps(
     shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.random.Generator
 ) -> Iterator[Grasp]:
-    """Grasps that leave a wiping tool's base and long faces free: from above, by the ends of its longest level axis."""
+    """Grasps that leave a wiping tool's base and two of its faces free: from above, by the ends of its longest level
+    axis that fits between the fingers."""
+    size = extents(shape)
     level = np.argsort(np.abs(X_WO.rotation[2]))[:2]
-    longest = int(max(level, key=lambda axis: extents(shape)[axis]))
+    longest = int(max(level, key=lambda axis: (size[axis] <= gripper.stroke - 2 * CLEARANCE, size[axis])))
     for grasp in grasps(shape, X_WO, gripper, base, rng):
         closing = grasp.X_OG.rotation[:, 1]
         approach_W = X_WO.rotation @ grasp.X_OG.rotation[:, 2]

@@ -247,7 +247,7 @@ class Wipe:
 
 @dataclass(frozen=True)
 class _Broadside:
-    """How a held tool lies to its course: unit columns in O of its front (along its longest level axis), the course
+    """How a held tool lies to its course: unit columns in O of its front (along which the fingers close), the course
     and up; its width and depth in metres, and how far it reaches below its origin. p_OM (3,): where the middle of its
     bounding box lies from the origin."""
 
@@ -264,12 +264,13 @@ class _Broadside:
         approach_O = held.X_GO.rotation.T[:, 2]
         down = int(np.argmax(np.abs(approach_O)))
         level = [axis for axis in range(3) if axis != down]
-        longest = max(level, key=lambda axis: size[axis])
-        other = next(axis for axis in level if axis != longest)
+        closing_O = held.X_GO.rotation.T[:, 1]
+        front = max(level, key=lambda axis: abs(closing_O[axis]))
+        other = next(axis for axis in level if axis != front)
         z_O = -np.sign(approach_O[down]) * np.eye(3)[down]
-        y_O = np.eye(3)[longest]
+        y_O = np.eye(3)[front]
         basis_O = np.column_stack([np.cross(y_O, z_O), y_O, z_O])
-        return _Broadside(basis_O, float(size[longest]), float(size[other]), reach(shape, -z_O), middle(shape))
+        return _Broadside(basis_O, float(size[front]), float(size[other]), reach(shape, -z_O), middle(shape))
 
     def turned(self, heading: float, flipped: bool) -> np.ndarray:
         """Rotation R_WO of the tool broadside to a heading."""
