@@ -13,7 +13,6 @@ from planner.task.situation import Situation, Spot
 from planner.task.symbols import GroundAction
 from sim.scene import SceneState
 
-
 MAX_WORKED = 4
 """Samples of an action that are kept because they worked, the latest first."""
 
