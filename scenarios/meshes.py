@@ -1,5 +1,6 @@
 """Mesh files: the points of a convex mesh in a Wavefront .obj file."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,15 +19,15 @@ def read_points(file: str, folder: Path | None) -> np.ndarray:
 
     Raises ShapeError, which names the file, if it lies outside `folder`, can't be read or isn't convex.
     """
-    points = _vertices(_text(file, folder), file)
+    points, faces = _contents(_text(file, folder), file)
     try:
         solid = polyhedron(points)
     except ShapeError as error:
         raise ShapeError(f"{file}: {error}") from None
-    depth = -np.array([solid.outside(p) for p in points])
-    if depth.max() > HOLLOW * float(np.ptp(points, axis=0).max()):
+    depth = -min(solid.outside(p) for p in (*points, *_within_faces(points, faces)))
+    if depth > HOLLOW * float(np.ptp(points, axis=0).max()):
         raise ShapeError(
-            f"{file}: is not convex (a vertex lies {depth.max() * 1000:.3g} mm inside the convex hull), "
+            f"{file}: is not convex (its surface lies up to {depth * 1000:.3g} mm inside the convex hull), "
             "expected a convex mesh, or a compound of several"
         )
     return points
@@ -54,21 +55,47 @@ def _text(file: str, folder: Path | None) -> str:
         raise ShapeError(f"{file}: can't be read ({error}), expected a mesh") from None
 
 
-def _vertices(text: str, file: str) -> np.ndarray:
-    points = []
+def _within_faces(points: np.ndarray, faces: list[list[int]]) -> Iterator[np.ndarray]:
+    """The middle of each face, and of each of its edges: the corners of an L all lie on its hull."""
+    for face in faces:
+        corners = points[face]
+        yield corners.mean(axis=0)
+        yield from (corners + np.roll(corners, 1, axis=0)) / 2
+
+
+def _contents(text: str, file: str) -> tuple[np.ndarray, list[list[int]]]:
+    """Vertices (n,3), and the numbers of each face's."""
+    points: list[tuple[float, float, float]] = []
+    faces: list[tuple[int, list[str]]] = []
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.split()
-        if not words or words[0] != "v":
-            continue
-        try:
-            x, y, z = (float(word) for word in words[1:4])
-        except ValueError:
-            raise ShapeError(f"{file}: line {number} is no vertex, expected v X Y Z") from None
-        if not all(abs(c) <= 10.0 for c in (x, y, z)):
-            raise ShapeError(f"{file}: line {number} lies beyond 10 m, expected metres")
-        points.append((x, y, z))
-        if len(points) > MAX_POINTS:
-            raise ShapeError(f"{file}: has more than {MAX_POINTS} vertices, expected fewer")
+        if words and words[0] == "v":
+            points.append(_vertex(words, number, file))
+            if len(points) > MAX_POINTS:
+                raise ShapeError(f"{file}: has more than {MAX_POINTS} vertices, expected fewer")
+        elif words and words[0] == "f":
+            faces.append((number, words[1:]))
     if not points:
         raise ShapeError(f"{file}: holds no vertex, expected lines v X Y Z")
-    return np.array(points)
+    return np.array(points), [_face(words, len(points), number, file) for number, words in faces]
+
+
+def _vertex(words: list[str], number: int, file: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(word) for word in words[1:4])
+    except ValueError:
+        raise ShapeError(f"{file}: line {number} is no vertex, expected v X Y Z") from None
+    if not all(abs(c) <= 10.0 for c in (x, y, z)):
+        raise ShapeError(f"{file}: line {number} lies beyond 10 m, expected metres")
+    return x, y, z
+
+
+def _face(words: list[str], count: int, number: int, file: str) -> list[int]:
+    """Numbers of a face's vertices from 0: in the file they count from 1, or back from the last one."""
+    try:
+        given = [int(word.split("/")[0]) for word in words]
+    except ValueError:
+        given = []
+    if len(given) < 3 or not all(0 < abs(k) <= count for k in given):
+        raise ShapeError(f"{file}: line {number} is no face, expected f with the numbers of three or more vertices")
+    return [k - 1 if k > 0 else count + k for k in given]

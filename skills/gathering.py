@@ -154,11 +154,14 @@ def _directed(place: Place, k: int) -> Iterator[list[Stroke]]:
     widest = max(0.0, opening.half_width - r / 2)
     square = float(np.clip((p - opening.middle) @ opening.across, -widest, widest))
     exits = [exit_ for exit_ in np.linspace(-reach, reach, EXITS) if abs(exit_ - square) > LATERAL_STEP]
-    steps = int(max(place.tool.width / 2 - r - EDGE, 0.0) / LATERAL_STEP)
+    room = max(place.tool.width / 2 - r - EDGE, 0.0)
+    steps = np.arange(-int(room / LATERAL_STEP), int(room / LATERAL_STEP) + 1) * LATERAL_STEP
+    # Beside a wall only the sponge's very end gets behind the crumb.
+    offsets = sorted({*steps.tolist(), -room, room})
     for exit_ in [square, *sorted(exits, key=lambda exit_: abs(exit_ - square))]:
         way = opening.middle + opening.across * exit_ - p
         heading = float(np.arctan2(way[1], way[0]))
-        asides = [float(p @ left(heading)) + step * LATERAL_STEP for step in range(-steps, steps + 1)]
+        asides = [float(p @ left(heading)) + offset for offset in offsets]
         yield [stroke for aside in asides for stroke in _fitted(place, heading, aside, k)]
 
 

@@ -97,6 +97,23 @@ def scenario_of(arguments: argparse.Namespace) -> "Scenario":
         return load_scenario(arguments.scene, arguments.seed)
 
 
+def startable_scenario_of(arguments: argparse.Namespace) -> "Scenario":
+    """The same, if the robot can stand and begin where the scene has it. Raises UserError or SceneError."""
+    scenario = scenario_of(arguments)
+    check_start(scenario, str(arguments.scene))
+    return scenario
+
+
+def check_start(scenario: "Scenario", file: str) -> None:
+    """Raise SceneInvalid if the robot can't stand and begin where the scene has it."""
+    from bt_tamp.executive.start import start_problem
+    from scenarios.errors import SceneInvalid
+
+    problem = start_problem(scenario)
+    if problem is not None:
+        raise SceneInvalid(problem[1], file, f"robot.{problem[0]}")
+
+
 def _check_names(options: "RunOptions") -> None:
     """Names known to the planners alone are looked up only when given: that import takes its time."""
     from bt_tamp.errors import refusing

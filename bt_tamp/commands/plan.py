@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from bt_tamp.commands.choices import add_planning, add_scene, options_of, scenario_of
+from bt_tamp.commands.choices import add_planning, add_scene, options_of, startable_scenario_of
 
 if TYPE_CHECKING:
     from planner.search_then_sample import Solution
@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def call(arguments: argparse.Namespace) -> int:
     """Print what happens while planning, then the plan; 0, or why there is none: 10 proven, 11 within the budget."""
     options = options_of(arguments)
-    scenario = scenario_of(arguments)
+    scenario = startable_scenario_of(arguments)
 
     from bt_tamp.quiet import quiet_imports
 

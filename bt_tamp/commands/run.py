@@ -6,7 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_tamp.commands.choices import add_disturbances, add_planning, add_scene, add_time_limit, options_of, scenario_of
+from bt_tamp.commands.choices import (
+    add_disturbances,
+    add_planning,
+    add_scene,
+    add_time_limit,
+    options_of,
+    startable_scenario_of,
+)
 from bt_tamp.commands.stopping import stop_on_signals
 
 if TYPE_CHECKING:
@@ -74,7 +81,7 @@ def _beginning(arguments: argparse.Namespace) -> "tuple[Scenario, RunState | Non
     if (arguments.scene is None) == (arguments.resume is None):
         raise UserError("expected either a SCENE or --resume DIR")
     if arguments.resume is None:
-        return scenario_of(arguments), None
+        return startable_scenario_of(arguments), None
 
     from bt_tamp.report.folder import SCENARIO, STATE, existing_run
     from bt_tamp.report.scenario_json import scenario_from_json

@@ -31,6 +31,8 @@ def _alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "misspelt.yaml").write_text(SCENE.replace("mass", "mas"))
     (tmp_path / "weightless.yaml").write_text(SCENE.replace("mass: 0.2", "mass: -0.2"))
     (tmp_path / "goal.yaml").write_text(SCENE.replace("in_bin mug", "in_bin mgu"))
+    (tmp_path / "sunk.yaml").write_text(SCENE.replace("50}", "50, base: {xyz: [0.4, 0.0, -0.04]}}"))
+    (tmp_path / "low.yaml").write_text(SCENE.replace("50}", "50, q0_deg: [0, 95, 0, -20, 0, 60, 0]}"))
     (tmp_path / "off.yaml").write_text(SCENE.replace("xy: [0.5, 0.0]", "xy: [0.5, 2.0]"))
     (tmp_path / "broken.pddl").write_text("(define (problem p)")
     (tmp_path / "other.pddl").write_text(
@@ -56,6 +58,8 @@ REFUSED = [
     (["run", "off.yaml"], "objects.mug"),
     (["run", "."], "."),
     (["validate", "goal.yaml"], "goal.yaml, goal"),
+    (["validate", "sunk.yaml"], "sunk.yaml, robot.base: the robot's base stands in 'table'"),
+    (["plan", "low.yaml"], "low.yaml, robot.q0_deg: the arm starts in collision ("),
     (["run", "small.yaml", "--seed", "-1"], "-1"),
     (["run", "small.yaml", "--seed", "one"], "one"),
     (["run", "small.yaml", "--tries", "0"], "--tries 0"),

@@ -17,6 +17,13 @@ TEE = """{compound: [{shape: {box: [0.1, 0.02, 0.02]}, pose: {xyz: [0, 0, 0.05]}
 CUBE_OBJ = "# a cube\n" + "".join(f"v {x} {y} {z}\n" for x in (0, 0.1) for y in (0, 0.1) for z in (0, 0.1))
 
 
+CORNERS = [(0, 0), (0.06, 0), (0.06, 0.02), (0.02, 0.02), (0.02, 0.06), (0, 0.06)]
+ANGLE_OBJ = "".join(f"v {x} {y} {z}\n" for x, y in CORNERS for z in (0, 0.05)) + "".join(
+    f"f {2 * k + 1} {2 * k + 2} {(2 * k + 3) % 12 + 1} {(2 * k + 2) % 12 + 1}\n" for k in range(6)
+)
+"""An angle iron: all its corners lie on its hull."""
+
+
 def test_a_mesh_stands_on_the_table_about_its_centre_of_volume(plain, build):
     mug = build(plain.replace(MUG, WEDGE)).bodies["mug"]
     assert isinstance(mug.shape, Hull)
@@ -94,7 +101,9 @@ def test_a_mesh_file_beside_the_scene_is_read(load):
         ("nothing\n", "cup.obj", "holds no vertex"),
         ("v 0 0\n", "cup.obj", "line 1 is no vertex"),
         ("v 0 0 nan\n", "cup.obj", "beyond 10 m"),
-        (CUBE_OBJ + "v 0.05 0.05 0.02\n", "cup.obj", "is not convex (a vertex lies 20 mm inside"),
+        (ANGLE_OBJ, "cup.obj", "is not convex (its surface lies up to 20 mm inside"),
+        (ANGLE_OBJ + "f 1/2 3/x -1//4\nf 1 2 13\n", "cup.obj", "line 20 is no face"),
+        (CUBE_OBJ + "v 0.05 0.05 0.02\n", "cup.obj", "is not convex (its surface lies up to 20 mm inside"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n", "cup.obj", "cup.obj: the points lie within 0 mm of a plane"),
     ],
 )

@@ -10,6 +10,7 @@ from pinocchio import SE3
 from py_trees.common import Status
 
 from planner.failure import RefinementFailure
+from planner.refinement import Refinement
 from planner.task.facts import place_of
 from scenarios.shapes import Box, Cylinder, Hull, reach
 
@@ -40,6 +41,16 @@ def test_the_sponge_is_picked_by_its_ends_and_hangs_level():
     closing_W = bench.robot.X_WG(bench.scene.q).rotation[:, 1]
     assert abs(closing_W @ X_WO.rotation[:, 0]) > 0.99
     assert X_WO.rotation[2, 2] > np.cos(np.radians(3))
+
+
+def test_a_sponge_longer_than_the_fingers_open_is_picked_by_its_long_sides():
+    scene = scene_with("sponge")
+    long = replace(
+        scene.bodies["sponge"], shape=Box((0.13, 0.07, 0.04)), X_WO=SE3(np.eye(3), np.array([0.6, 0.1, 0.07]))
+    )
+    found = Bench(replace(scene, bodies={"sponge": long})).refine(action("pick(sponge, table)"))
+    assert isinstance(found, Refinement), found
+    assert found.sample.width == pytest.approx(0.07)
 
 
 def test_what_touches_a_neighbour_is_lifted_off_beside_it():

@@ -10,7 +10,7 @@ from pinocchio import SE3
 
 from scenarios.scenario import Region, Table
 from skills.gathering import Place, bent_strokes, cover, fewest, strokes_for
-from skills.strokes import CHORD, Crumbs, Stroke, Tool, along, left, opening_of, taken
+from skills.strokes import CHORD, EDGE, Crumbs, Stroke, Tool, along, left, opening_of, taken
 
 TABLE = Table((0.44, 0.68, 0.05), SE3(np.eye(3), np.array([0.62, 0.06, 0.025])), 0.5)
 PAN = Region("pan", "dustpan", (0.20, 0.15, 0.055), 0.01, SE3(np.eye(3), np.array([0.68, -0.355, -0.0075])), 0.5, "+y")
@@ -120,6 +120,15 @@ def test_every_stroke_for_a_crumb_most_likely_takes_it():
         found = list(strokes_for(place, name))
         assert found
         assert all(place.taken(stroke, surely=False)[k] for stroke in found)
+
+
+def test_beside_a_wall_the_sponges_very_end_gets_behind_a_crumb():
+    crumbs = crumbs_at((0.66, 0.1))
+    place = place_with(crumbs)
+    room = place.tool.width / 2 - float(crumbs.r[0]) - EDGE
+    offsets = [float(place.crumbs_met(stroke)[1][0]) for stroke in strokes_for(place, "c0") if not stroke.turn]
+    assert min(offsets) == pytest.approx(-room, abs=1e-6)
+    assert max(offsets) == pytest.approx(room, abs=1e-6)
 
 
 def test_a_crumb_off_to_the_side_is_taken_round_a_bend():
