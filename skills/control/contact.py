@@ -25,7 +25,8 @@ SENSOR_ERROR = (1.0, 0.3)
 
 
 class ContactWrench:
-    """Wrench that the world exerts on the tool, at G in W axes (6,): `raw`, and `smooth` (low-passed).
+    """Wrench that the world exerts on the tool, at G in W axes (6,): `raw`; `smooth`, low-passed; and `credible`, which
+    is `raw` as far as it is more than the sensor's own error.
 
     The sensor also feels the weight and inertia of the hand and its load: both are taken off. The
     acceleration is the difference of measured velocities: one predicted by the model would miss what
@@ -42,8 +43,7 @@ class ContactWrench:
         self._bias_G = np.zeros(6)
         self._smooth_G = np.zeros(6)
         self._taring: _Mean | None = None
-        self.raw = np.zeros(6)
-        self.smooth = np.zeros(6)
+        self.raw, self.smooth, self.credible = np.zeros(6), np.zeros(6), np.zeros(6)
         self.is_silent = False
 
     def carry(self, load: pin.Inertia | None) -> None:
@@ -64,25 +64,17 @@ class ContactWrench:
         last, self._last_v = self._last_v, state.v
         if last is None:
             return
-        self.is_silent = not math.isfinite(math.fsum((*wrist.force.tolist(), *wrist.torque.tolist())))
+        contact, body, motion = np.empty(6), self._body, (state.J, state.drift, state.V, state.R)
+        self.is_silent = not _contact_wrench(
+            last, state.v, self._period, *motion, *body, wrist.force, wrist.torque, self._bias_G, contact
+        )
         if self.is_silent:
             return
-        contact = np.empty(6)
-        a = (state.v - last) / self._period
-        _contact_wrench(state.J, a, state.drift, state.V, state.R, *self._body, wrist.force, wrist.torque, contact)
-        contact -= self._bias_G
         if self._taring is not None:
             contact = self._go_on_taring(self._taring, contact)
-        self.raw, self.smooth = np.empty(6), np.empty(6)
+        self.raw, self.smooth, self.credible = np.empty(6), np.empty(6), np.empty(6)
         _smooth(contact, self._blend, state.R, self._smooth_G, self.raw, self.smooth)
-
-    @property
-    def credible(self) -> np.ndarray:
-        """`raw` (6,) as far as it is more than the sensor's own error: nothing below half of SENSOR_ERROR."""
-        x, y, z, a, b, c = self.raw.tolist()
-        force, torque = math.sqrt(x * x + y * y + z * z), math.sqrt(a * a + b * b + c * c)
-        size = max(force / SENSOR_ERROR[0], torque / SENSOR_ERROR[1])
-        return self.raw * smooth_step(2.0 * size - 1.0)
+        _believe(self.raw, self.credible)
 
     def _go_on_taring(self, mean: "_Mean", contact: np.ndarray) -> np.ndarray:
         force = self._smooth_G[:3]
@@ -154,6 +146,37 @@ def hand_inertia(robot: RobotModel) -> pin.Inertia:
 
 
 @njit(cache=True)
+def along(normal: np.ndarray, wrench: np.ndarray) -> float:
+    """The part in N along `normal` (3,), a unit vector, of the force of a wrench (6,)."""
+    return normal[0] * wrench[0] + normal[1] * wrench[1] + normal[2] * wrench[2]
+
+
+def with_force_along(normal: np.ndarray, force: float, wrench: np.ndarray) -> np.ndarray:
+    """The wrench (6,) with a force of so many N along `normal` (3,), a unit vector, in place of its own."""
+    changed = np.empty(6)
+    _put_along(normal, force, wrench, changed)
+    return changed
+
+
+@njit(cache=True)
+def _put_along(normal, force, wrench, changed):
+    missing = force - along(normal, wrench)
+    for i in range(3):
+        changed[i] = wrench[i] + normal[i] * missing
+        changed[3 + i] = wrench[3 + i]
+
+
+@njit(cache=True)
+def _believe(raw, credible):
+    """Nothing below half of SENSOR_ERROR, everything above it."""
+    force = math.sqrt(raw[0] ** 2 + raw[1] ** 2 + raw[2] ** 2)
+    torque = math.sqrt(raw[3] ** 2 + raw[4] ** 2 + raw[5] ** 2)
+    share = smooth_step(2.0 * max(force / SENSOR_ERROR[0], torque / SENSOR_ERROR[1]) - 1.0)
+    for i in range(6):
+        credible[i] = share * raw[i]
+
+
+@njit(cache=True)
 def _smooth(contact, blend, R, smooth_G, raw, smooth):
     """Blend the wrench `contact` (6,), in G, into `smooth_G`, and turn both into W's axes: `raw` and `smooth`."""
     for i in range(6):
@@ -167,9 +190,16 @@ def _smooth(contact, blend, R, smooth_G, raw, smooth):
 
 
 @njit(cache=True)
-def _contact_wrench(J, a, drift, V, R, mass, lever, inertia, R_GE, p_GE, force, torque, contact):
+def _contact_wrench(
+    v_before, v, period, J, drift, V, R, mass, lever, inertia, R_GE, p_GE, force, torque, bias_G, contact
+):
     """What acts on the tool from outside (6,), about G in its axes: what the sensor feels (force, torque in E) less
-    weight and inertia of the body beyond it, by Newton and Euler."""
+    weight and inertia of the body beyond it, by Newton and Euler, and less its bias. False if it feels no number."""
+    total = 0.0
+    for i in range(3):
+        total += force[i] + torque[i]
+    if not math.isfinite(total):
+        return False
     lift, swing, spin = np.empty(3), np.empty(3), np.empty(3)
     for i in range(3):
         # Accelerations of G, in G's axes; gravity counts as an acceleration upwards.
@@ -177,8 +207,9 @@ def _contact_wrench(J, a, drift, V, R, mass, lever, inertia, R_GE, p_GE, force, 
         for k in range(3):
             linear, angular = drift[k], drift[3 + k]
             for j in range(7):
-                linear += J[k, j] * a[j]
-                angular += J[3 + k, j] * a[j]
+                a = (v[j] - v_before[j]) / period
+                linear += J[k, j] * a
+                angular += J[3 + k, j] * a
             if k == 2:
                 linear += GRAVITY
             lift[i] += R[k, i] * linear
@@ -189,6 +220,9 @@ def _contact_wrench(J, a, drift, V, R, mass, lever, inertia, R_GE, p_GE, force, 
     felt = R_GE @ force
     contact[:3] = felt + mass * centre
     contact[3:] = R_GE @ torque + _cross(p_GE, felt) + turning + mass * _cross(lever, centre)
+    for i in range(6):
+        contact[i] -= bias_G[i]
+    return True
 
 
 @njit(cache=True)

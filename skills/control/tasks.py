@@ -9,8 +9,7 @@ consistent projection of Khatib, 1987.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
@@ -30,8 +29,7 @@ LANDING_DAMPING = 50.0
 """The same at touchdown, against bouncing: later it would hold back the force."""
 
 
-@dataclass(frozen=True, slots=True)
-class Rows:
+class Rows(NamedTuple):
     """Cost weight · ‖A q̈ − b‖² with A (k,7) and b (k,)."""
 
     A: np.ndarray
@@ -45,8 +43,7 @@ class Task(Protocol):
     def rows(self, state: ArmState) -> Rows: ...
 
 
-@dataclass(frozen=True, slots=True)
-class JointTask:
+class JointTask(NamedTuple):
     """Follow q_d, v_d, a_d (7,) in joint space: q̈* = a_d + 80 (v_d − q̇) + 1600 (q_d − q).
 
     Stiff, because the last joint carries little inertia: there, what the grip on a held thing
@@ -60,11 +57,12 @@ class JointTask:
     stiffness: float = STIFF
 
     def rows(self, state: ArmState) -> Rows:
-        return Rows(_EYE, self.a + self.damping * (self.v - state.v) + self.stiffness * (self.q - state.q))
+        wanted = np.empty(7)
+        _joint_accelerations(self.q, self.v, self.a, self.damping, self.stiffness, state.q, state.v, wanted)
+        return Rows(_EYE, wanted)
 
 
-@dataclass(frozen=True, slots=True)
-class PostureTask:
+class PostureTask(NamedTuple):
     """Follow q, v, a (7,) with the one freedom that six task-space rows leave.
 
     The row is nᵀ M q̈ with J n = 0: orthogonal, in the metric of M, to whatever moves the tool, so
@@ -111,8 +109,7 @@ class PoseTask:
         return Rows(state.J, target.A + pull / root - state.drift)
 
 
-@dataclass(frozen=True, slots=True)
-class HybridTask:
+class HybridTask(NamedTuple):
     """Follow the target stiffly, except along the z axis of the contact frame C: there velocity is
     only damped, and a force (added by the caller as a feedforward torque) decides.
 
@@ -124,9 +121,8 @@ class HybridTask:
     sink_damping: float = SINK_DAMPING
 
     def rows(self, state: ArmState) -> Rows:
-        target, wanted = self.target, np.empty(6)
-        _fill_pose_error(target.p, target.R, state.p, state.R, wanted)
-        _hybrid_acceleration(wanted, target.V, target.A, state.V, state.drift, self.R_WC, self.sink_damping)
+        wanted, now = np.empty(6), (state.p, state.R, state.V, state.drift)
+        _hybrid_acceleration(*self.target, *now, self.R_WC, self.sink_damping, wanted)
         return Rows(state.J, wanted)
 
 
@@ -186,16 +182,14 @@ def _fill_pose_error(p_d: np.ndarray, R_d: np.ndarray, p: np.ndarray, R: np.ndar
 
 
 @njit(cache=True)
-def _hybrid_acceleration(
-    wanted: np.ndarray,
-    V_d: np.ndarray,
-    A_d: np.ndarray,
-    V: np.ndarray,
-    drift: np.ndarray,
-    R_WC: np.ndarray,
-    sink_damping: float,
-) -> None:
-    """From the pose error (6,) in `wanted` to the rows' b."""
+def _joint_accelerations(q_d, v_d, a_d, damping, stiffness, q, v, wanted):
+    for i in range(len(q)):
+        wanted[i] = a_d[i] + damping * (v_d[i] - v[i]) + stiffness * (q_d[i] - q[i])
+
+
+@njit(cache=True)
+def _hybrid_acceleration(p_d, R_d, V_d, A_d, p, R, V, drift, R_WC, sink_damping, wanted):
+    _fill_pose_error(p_d, R_d, p, R, wanted)
     along = sinking = 0.0
     for i in range(6):
         wanted[i] = A_d[i] + DAMPED * (V_d[i] - V[i]) + STIFF * wanted[i]
