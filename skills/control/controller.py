@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from numba import njit
 
 from planner.motion.trajectory import Trajectory
 from sim.plant import Observation
@@ -330,8 +331,17 @@ class ArmController:
     def _feedforward(self, state: ArmState, wrench: np.ndarray) -> np.ndarray:
         """Torques (7,) on top of the model's: what bridges a change of law, bears the wrench, makes up for errors."""
         lacking = self._observer.unmodelled if self._unexplained is None else self._unexplained
-        return self._bridge.advance() - state.torques_of(wrench) - self._compensation.advance(lacking)
+        feedforward = state.torques_of(wrench)
+        _sum_up(self._bridge.advance(), self._compensation.advance(lacking), feedforward)
+        return feedforward
 
 
 _UP = np.array([0.0, 0.0, 1.0])
 _NO_TORQUE = np.zeros(7)
+
+
+@njit(cache=True)
+def _sum_up(bridge: np.ndarray, lacking: np.ndarray, torques: np.ndarray) -> None:
+    """From the torques (7,) of a wrench on the tool to those that balance it."""
+    for i in range(len(torques)):
+        torques[i] = bridge[i] - torques[i] - lacking[i]
