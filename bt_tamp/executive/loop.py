@@ -7,7 +7,6 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 from py_trees.common import Status
 
 from bt_tamp.disturb.driver import Driver
@@ -201,7 +200,8 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
     force = controller.contact_force if controller.contact else 0.0
     tally.peak_force_n = max(tally.peak_force_n, force)
     if n % SAMPLE_EVERY == 0:
-        power = float(np.abs(observation.tau) @ np.abs(observation.v))
+        rates = zip(observation.tau.tolist(), observation.v.tolist(), strict=True)
+        power = sum(abs(torque * rate) for torque, rate in rates)
         tally.energy_j += power * SAMPLE_EVERY * CONTROL_EVERY * machine.plant.timestep
         reference = controller.reference
         wanted = reference.force if reference else 0.0

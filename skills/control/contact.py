@@ -10,6 +10,7 @@ from sim.robot import GRAVITY, RobotModel
 from sim.wrench import Wrench
 from skills.control.force import smooth_step
 from skills.control.state import ArmState
+from skills.control.vectors import cross, turn, turn_back
 
 SMOOTHING = 0.02
 """Time constant in seconds of the smoothed wrench."""
@@ -200,31 +201,20 @@ def _contact_wrench(
         total += force[i] + torque[i]
     if not math.isfinite(total):
         return False
-    lift, swing, spin = np.empty(3), np.empty(3), np.empty(3)
+    # Accelerations of G, linear before angular; gravity counts as an acceleration upwards.
+    rates = np.empty(6)
+    for k in range(6):
+        rates[k] = drift[k]
+        for j in range(7):
+            rates[k] += J[k, j] * (v[j] - v_before[j]) / period
+    rates[2] += GRAVITY
+    lift, swing, spin = turn_back(R, rates[:3]), turn_back(R, rates[3:]), turn_back(R, V[3:])
+    swung, spun = cross(swing, lever), cross(spin, cross(spin, lever))
+    centre = (lift[0] + swung[0] + spun[0], lift[1] + swung[1] + spun[1], lift[2] + swung[2] + spun[2])
+    rolling, gyration, thrown = turn(inertia, swing), cross(spin, turn(inertia, spin)), cross(lever, centre)
+    push, twist = turn(R_GE, force), turn(R_GE, torque)
+    pried = cross(p_GE, push)
     for i in range(3):
-        # Accelerations of G, in G's axes; gravity counts as an acceleration upwards.
-        lift[i] = swing[i] = spin[i] = 0.0
-        for k in range(3):
-            linear, angular = drift[k], drift[3 + k]
-            for j in range(7):
-                a = (v[j] - v_before[j]) / period
-                linear += J[k, j] * a
-                angular += J[3 + k, j] * a
-            if k == 2:
-                linear += GRAVITY
-            lift[i] += R[k, i] * linear
-            swing[i] += R[k, i] * angular
-            spin[i] += R[k, i] * V[3 + k]
-    centre = lift + _cross(swing, lever) + _cross(spin, _cross(spin, lever))
-    turning = inertia @ swing + _cross(spin, inertia @ spin)
-    felt = R_GE @ force
-    contact[:3] = felt + mass * centre
-    contact[3:] = R_GE @ torque + _cross(p_GE, felt) + turning + mass * _cross(lever, centre)
-    for i in range(6):
-        contact[i] -= bias_G[i]
+        contact[i] = push[i] + mass * centre[i] - bias_G[i]
+        contact[3 + i] = twist[i] + pried[i] + rolling[i] + gyration[i] + mass * thrown[i] - bias_G[3 + i]
     return True
-
-
-@njit(cache=True)
-def _cross(a, b):
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -16,6 +16,7 @@ from numba import njit
 
 from sim.robot import GRAVITY, RobotModel
 from skills.control.state import ArmState, Target
+from skills.control.vectors import cross, dot, turn
 
 
 class Dynamics:
@@ -55,16 +56,6 @@ def _table(body: pin.Inertia) -> np.ndarray:
 
 
 @njit(cache=True)
-def _cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit(cache=True)
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit(cache=True)
 def _move(frames, q, v, a, R, p, w, dw, dp, ddp):
     """Place and move joint frames 1 to 7 and the tool's, 8, each in what comes before it; 0 is W. Rotations R (9,3,3),
     and of each origin: p, angular velocity w and acceleration dw, linear ones dp and ddp (9,3)."""
@@ -87,10 +78,10 @@ def _move(frames, q, v, a, R, p, w, dw, dp, ddp):
             R[i + 1, r, 1] = c * across - s * along
             R[i + 1, r, 2] = x * F[0, 2] + y * F[1, 2] + z * F[2, 2]
             arm[r] = x * F[0, 3] + y * F[1, 3] + z * F[2, 3]
-        turned, swung = _cross(w[i], arm), _cross(dw[i], arm)
-        centripetal = _cross(w[i], turned)
+        turned, swung = cross(w[i], arm), cross(dw[i], arm)
+        centripetal = cross(w[i], turned)
         axis = R[i + 1, 0, 2], R[i + 1, 1, 2], R[i + 1, 2, 2]
-        coriolis = _cross(w[i], axis)
+        coriolis = cross(w[i], axis)
         for k in range(3):
             p[i + 1, k] = p[i, k] + arm[k]
             dp[i + 1, k] = dp[i, k] + turned[k]
@@ -121,8 +112,8 @@ def _fill_state(frames, bodies, q, v, M, bias, J, drift, p_G, R_G, V):
     S = np.empty((n, 6))
     for i in range(n):
         axis = R[i + 1, 0, 2], R[i + 1, 1, 2], R[i + 1, 2, 2]
-        linear = _cross(p[i + 1], axis)
-        swept = _cross(axis, p_G)
+        linear = cross(p[i + 1], axis)
+        swept = cross(axis, p_G)
         for k in range(3):
             S[i, k], S[i, 3 + k] = linear[k], axis[k]
             J[k, i], J[3 + k, i] = linear[k] + swept[k], axis[k]
@@ -134,21 +125,21 @@ def _fill_state(frames, bodies, q, v, M, bias, J, drift, p_G, R_G, V):
     centre = np.empty(3)
     for j in range(n - 1, -1, -1):
         body, R_j = bodies[j], R[j + 1]
-        lever = _turn(R_j, body[0])
+        lever = turn(R_j, body[0])
         for r in range(3):
             centre[r] = p[j + 1, r] + lever[r]
         _turn_inertia(R_j, body, turning)
-        swung, spun = _cross(dw[j + 1], lever), _cross(w[j + 1], _cross(w[j + 1], lever))
-        gyration = _cross(w[j + 1], _turn(turning, w[j + 1]))
-        rolling = _turn(turning, dw[j + 1])
+        swung, spun = cross(dw[j + 1], lever), cross(w[j + 1], cross(w[j + 1], lever))
+        gyration = cross(w[j + 1], turn(turning, w[j + 1]))
+        rolling = turn(turning, dw[j + 1])
         m = body[0, 3]
         push = (
             m * (ddp[j + 1, 0] + swung[0] + spun[0]),
             m * (ddp[j + 1, 1] + swung[1] + spun[1]),
             m * (ddp[j + 1, 2] + swung[2] + spun[2] + GRAVITY),
         )
-        about = _cross(centre, push)
-        square = _dot(centre, centre)
+        about = cross(centre, push)
+        square = dot(centre, centre)
         mass += m
         for r in range(3):
             force[r] += push[r]
@@ -158,9 +149,9 @@ def _fill_state(frames, bodies, q, v, M, bias, J, drift, p_G, R_G, V):
                 inertia[r, k] += turning[r, k] - m * centre[r] * centre[k]
             inertia[r, r] += m * square
         linear, axis = S[j, :3], S[j, 3:]
-        bias[j] = _dot(linear, force) + _dot(axis, torque)
+        bias[j] = dot(linear, force) + dot(axis, torque)
         # The force and moment that one unit of acceleration of joint j takes.
-        dragged, shifted, rolled = _cross(axis, moment), _cross(moment, linear), _turn(inertia, axis)
+        dragged, shifted, rolled = cross(axis, moment), cross(moment, linear), turn(inertia, axis)
         for i in range(j + 1):
             M[i, j] = 0.0
             for k in range(3):
@@ -176,11 +167,6 @@ def _room(n):
 
 
 @njit(cache=True)
-def _turn(A, x):
-    return _dot(A[0], x), _dot(A[1], x), _dot(A[2], x)
-
-
-@njit(cache=True)
 def _turn_inertia(R, body, turned):
     """R I Rᵀ of the body's inertia I about its centre."""
     for r in range(3):
@@ -190,4 +176,4 @@ def _turn_inertia(R, body, turned):
             R[r, 0] * body[1, 2] + R[r, 1] * body[2, 2] + R[r, 2] * body[3, 2],
         )
         for k in range(3):
-            turned[r, k] = _dot(row, R[k])
+            turned[r, k] = dot(row, R[k])

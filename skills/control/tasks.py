@@ -154,14 +154,15 @@ def _fill_pose_error(p_d: np.ndarray, R_d: np.ndarray, p: np.ndarray, R: np.ndar
         error[i] = p_d[i] - p[i]
         for j in range(3):
             Q[i, j] = R_d[i, 0] * R[j, 0] + R_d[i, 1] * R[j, 1] + R_d[i, 2] * R[j, 2]
-    # Unit quaternion of Q, from whichever of its components is large (Shepperd, 1978).
+    # Unit quaternion (u, w) of Q, from whichever of its components is large (Shepperd, 1978).
     trace = Q[0, 0] + Q[1, 1] + Q[2, 2]
-    u = np.empty(3)
+    u = error[3:]
     if trace > 0.0:
         root = math.sqrt(1.0 + trace)
         w = root / 2
         u[0], u[1], u[2] = Q[2, 1] - Q[1, 2], Q[0, 2] - Q[2, 0], Q[1, 0] - Q[0, 1]
-        u /= 2 * root
+        for i in range(3):
+            u[i] /= 2 * root
     else:
         i = 0
         if Q[1, 1] > Q[0, 0]:
@@ -173,12 +174,10 @@ def _fill_pose_error(p_d: np.ndarray, R_d: np.ndarray, p: np.ndarray, R: np.ndar
         u[i] = root / 2
         u[j], u[k] = (Q[i, j] + Q[j, i]) / (2 * root), (Q[i, k] + Q[k, i]) / (2 * root)
         w = (Q[k, j] - Q[j, k]) / (2 * root)
-    if w < 0.0:
-        w, u = -w, -u
     sine = math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-    scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, w) / sine
+    scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, abs(w)) / sine
     for i in range(3):
-        error[3 + i] = scale * u[i]
+        u[i] *= math.copysign(scale, w)
 
 
 @njit(cache=True)
