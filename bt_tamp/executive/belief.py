@@ -124,7 +124,7 @@ class Belief:
         def gap(name: str) -> float:
             return distance_to(self._declared.bodies[name].shape, poses[name].actInv(pads))
 
-        if self._held in poses and gap(self._held) < KEEP_REACH:
+        if self._held is not None and self._held in poses and gap(self._held) < KEEP_REACH:
             return self._held
         nearest = min(poses, key=gap, default=None)
         return nearest if nearest is not None and gap(nearest) < GRASP_REACH else None

@@ -74,8 +74,7 @@ class ContactWrench:
         if self._taring is not None:
             contact = self._go_on_taring(self._taring, contact)
         self.raw, self.smooth, self.credible = np.empty(6), np.empty(6), np.empty(6)
-        _smooth(contact, self._blend, state.R, self._smooth_G, self.raw, self.smooth)
-        _believe(self.raw, self.credible)
+        _smooth(contact, self._blend, state.R, self._smooth_G, self.raw, self.smooth, self.credible)
 
     def _go_on_taring(self, mean: "_Mean", contact: np.ndarray) -> np.ndarray:
         force = self._smooth_G[:3]
@@ -178,7 +177,7 @@ def _believe(raw, credible):
 
 
 @njit(cache=True)
-def _smooth(contact, blend, R, smooth_G, raw, smooth):
+def _smooth(contact, blend, R, smooth_G, raw, smooth, credible):
     """Blend the wrench `contact` (6,), in G, into `smooth_G`, and turn both into W's axes: `raw` and `smooth`."""
     for i in range(6):
         smooth_G[i] += blend * (contact[i] - smooth_G[i])
@@ -188,6 +187,7 @@ def _smooth(contact, blend, R, smooth_G, raw, smooth):
             for j in range(3):
                 raw[part + i] += R[i, j] * contact[part + j]
                 smooth[part + i] += R[i, j] * smooth_G[part + j]
+    _believe(raw, credible)
 
 
 @njit(cache=True)
