@@ -1,7 +1,7 @@
 """The arm's kinematics and dynamics, compiled: one call a tick for all that the controller needs of the model.
 
-Pinocchio is where the model comes from. It computes the same, but half a dozen calls into it and the arrays that they
-hand over cost several times what the physics between two ticks leaves in the processor's caches.
+Pinocchio is where the model comes from. It computes the same, but in a tick it costs three times as much: half a dozen
+calls with an array handed over each, whose code the physics has driven out of the processor's caches in between.
 
 Everything is about W's origin and in W's axes: joint i moves what lies beyond it by the twist S_i = (p_i × z_i, z_i),
 linear before angular. Recursive Newton-Euler and composite-rigid-body algorithms: Featherstone, "Rigid body dynamics

@@ -30,7 +30,7 @@ class Bound(Protocol):
 
 
 class Block(NamedTuple):
-    """lower ≤ R q̈ ≤ upper with R (m,7) and bounds (m,), to be filled row by row."""
+    """Limits lower ≤ R q̈ ≤ upper with R (m,7) and bounds (m,), to be filled row by row."""
 
     R: np.ndarray
     lower: np.ndarray
@@ -38,10 +38,10 @@ class Block(NamedTuple):
 
 
 class Row(Protocol):
-    """A limit on combinations of joint accelerations."""
+    """A limit on one combination of joint accelerations."""
 
-    def fill(self, state: ArmState, feedforward: np.ndarray, block: Block, start: int) -> int:
-        """Write rows into the block from row `start` on. Returns the row after the last."""
+    def fill(self, state: ArmState, block: Block, row: int) -> None:
+        """Write that row of the block."""
         ...
 
 
@@ -88,10 +88,9 @@ class TorqueLimits:
         self._inside = tau_max * (1.0 - self.margin)
         self._scale = 1.0 / tau_max
 
-    def fill(self, state: ArmState, feedforward: np.ndarray, block: Block, start: int) -> int:
-        """The torques M q̈ + h + f, in shares of each joint's limit."""
-        _torque_rows(state.M, state.bias, feedforward, self._inside, self._scale, *block, start)
-        return start + len(self._inside)
+    def fill(self, state: ArmState, feedforward: np.ndarray, block: Block) -> None:
+        """Write the first seven rows of the block: the torques M q̈ + h + f, in shares of each joint's limit."""
+        _torque_rows(state.M, state.bias, feedforward, self._inside, self._scale, *block)
 
     def broken(self, tau: np.ndarray) -> bool:
         """Whether any torque of tau (7,) lies beyond its limit."""
@@ -112,9 +111,8 @@ class ApproachLimit(NamedTuple):
     normal: np.ndarray
     speed: float
 
-    def fill(self, state: ArmState, feedforward: np.ndarray, block: Block, start: int) -> int:
-        _approach_row(self.normal, self.speed, state.V, state.J, state.drift, *block, start)
-        return start + 1
+    def fill(self, state: ArmState, block: Block, row: int) -> None:
+        _approach_row(self.normal, self.speed, state.V, state.J, state.drift, *block, row)
 
 
 APPROACH_HORIZON = 0.01
@@ -138,13 +136,12 @@ def _torque_rows(
     R: np.ndarray,
     lower: np.ndarray,
     upper: np.ndarray,
-    start: int,
 ) -> None:
     for i in range(len(bias)):
-        still, row = bias[i] + feedforward[i], start + i
-        lower[row], upper[row] = (-inside[i] - still) * scale[i], (inside[i] - still) * scale[i]
+        still = bias[i] + feedforward[i]
+        lower[i], upper[i] = (-inside[i] - still) * scale[i], (inside[i] - still) * scale[i]
         for j in range(len(bias)):
-            R[row, j] = M[i, j] * scale[i]
+            R[i, j] = M[i, j] * scale[i]
 
 
 @njit(cache=True)

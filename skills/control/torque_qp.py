@@ -85,20 +85,25 @@ class TorqueQP:
     def solve(
         self, state: ArmState, tasks: Sequence[Task], feedforward: np.ndarray, limits: Sequence[Row] = ()
     ) -> Solution:
-        """Accelerations and torques for this instant; feedforward f (7,) in Nm, `limits` of SPARE_ROWS rows at most.
+        """Accelerations and torques for this instant; feedforward f (7,) in Nm.
 
         Whenever the solver ends with anything but "solved", the last solution fades, tick by tick,
         into braking under gravity compensation, clipped to the torque limits.
+
+        Raises ValueError for more than SPARE_ROWS `limits`.
         """
-        problem, filled = self._problem, 0
+        if len(limits) > SPARE_ROWS:
+            raise ValueError(f"{len(limits)} limits besides the torques', expected {SPARE_ROWS} at most")
+        problem = self._problem
         _clear(*problem)
         for task in tasks:
             A, b, weight = task.rows(state)
             _add(A, b, weight, problem.P, problem.g)
         for bound in self._bounds:
             bound.narrow(state, *self._joint_bounds)
-        for limit in (self._torque_limits, *limits):
-            filled = limit.fill(state, feedforward, self._rows, filled)
+        self._torque_limits.fill(state, feedforward, self._rows)
+        for row, limit in enumerate(limits, start=7):
+            limit.fill(state, self._rows, row)
         self._lap("QP build")
         a, status = self._workspace.solve(problem)
         self._lap("solve")

@@ -5,10 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skills.control.dynamics import Dynamics
+from skills.control.limits import ApproachLimit
 from skills.control.osqp_ import Problem, Workspace
 from skills.control.state import Target
 from skills.control.tasks import HybridTask, JointTask, PostureTask
-from skills.control.torque_qp import FALLBACK_DAMPING, TorqueQP
+from skills.control.torque_qp import FALLBACK_DAMPING, SPARE_ROWS, TorqueQP
 
 PERIOD = 0.002
 NOTHING = np.zeros(7)
@@ -101,6 +102,16 @@ def test_tasks_are_met_exactly_while_no_limit_is_near(robot):
         state, [HybridTask(target, np.eye(3)), PostureTask(state.q, NOTHING, NOTHING)], NOTHING
     )
     np.testing.assert_allclose(state.J @ solution.a, target.A, atol=1e-3)
+
+
+def test_more_limits_than_there_are_rows_for_are_refused(robot):
+    state = random_state(robot, np.random.default_rng(7))
+    limit = ApproachLimit(np.array([0.0, 0.0, 1.0]), 0.05)
+    qp = TorqueQP(robot, PERIOD)
+    task = [JointTask(state.q, NOTHING, NOTHING)]
+    assert qp.solve(state, task, NOTHING, [limit] * SPARE_ROWS).status == "solved"
+    with pytest.raises(ValueError, match="3 limits besides the torques', expected 2 at most"):
+        qp.solve(state, task, NOTHING, [limit] * (SPARE_ROWS + 1))
 
 
 class FixedAnswer:
