@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 import pybullet as p
+from numba import njit
 from pinocchio import SE3
 
 from scenarios.regions import parts
@@ -24,7 +25,7 @@ from sim.plant import Command, GripCommand, Observation
 from sim.robot import GRAVITY, RobotModel
 from sim.scene import floor_height, pedestal
 from sim.window import frame_scene
-from sim.wrench import Wrench
+from sim.wrench import felt_at_joint
 
 PHYSICS_STEP = 1e-3
 """Seconds a step: at 240 Hz a sponge held by friction turns in the hand."""
@@ -95,19 +96,17 @@ class BulletPlant:
     def observe(self) -> Observation:
         states = p.getJointStates(self._robot, self._joints, physicsClientId=self._client)
         q, v, reactions, drives = zip(*states, strict=True)
-        sensor = reactions[-1]
-        # PyBullet reports the joint's reaction about the child link's centre of mass, on the child.
-        force = -np.array(sensor[:3])
+        self._slip = q[8] - q[7], v[8] - v[7]
         poses, velocities = self._look()
         return Observation(
             t=self._t,
             q=np.array(q[:7]),
             v=np.array(v[:7]),
-            tau=self._tau.copy(),
+            tau=self._tau,
             opening=q[7] + q[8],
             opening_velocity=v[7] + v[8],
             grip_force=(abs(drives[7]) + abs(drives[8])) / 2,
-            wrist=Wrench(force, self._lever @ force - np.array(sensor[3:])),
+            wrist=felt_at_joint(reactions[-1], self._lever),
             poses=poses,
             velocities=velocities,
             regions=self._shifted,
@@ -132,10 +131,10 @@ class BulletPlant:
         return self._poses, self._velocities
 
     def apply(self, command: Command) -> None:
-        if not math.isfinite(math.fsum(command.tau.tolist())):
+        tau = np.empty(7)
+        if not _clip(command.tau, self._tau_max, tau):
             raise ValueError(f"torque command must be finite, got {command.tau}")
-        self._tau = np.minimum(np.maximum(command.tau, -self._tau_max), self._tau_max)
-        self._torques = self._tau.tolist()
+        self._tau, self._torques = tau, tau.tolist()
         speed = min(max(float(command.grip.speed), -self._max_grip_speed), self._max_grip_speed) / 2
         force = min(max(float(command.grip.force), 0.0), self._max_grip_force)
         if (speed, force) == self._grip:
@@ -151,12 +150,14 @@ class BulletPlant:
         )
 
     def step(self) -> None:
-        left, right = p.getJointStates(self._robot, self._finger_joints, physicsClientId=self._client)
-        gear = GEAR_STIFFNESS * (right[0] - left[0]) + GEAR_DAMPING * (right[1] - left[1])
+        if self._slip is None:
+            left, right = p.getJointStates(self._robot, self._finger_joints, physicsClientId=self._client)
+            self._slip = right[0] - left[0], right[1] - left[1]
+        gear = GEAR_STIFFNESS * self._slip[0] + GEAR_DAMPING * self._slip[1]
         # PyBullet forgets applied torques after each step.
         p.setJointMotorControlArray(
             self._robot,
-            self._arm_joints + self._finger_joints,
+            self._driven_joints,
             p.TORQUE_CONTROL,
             forces=[*self._torques, gear, -gear],
             physicsClientId=self._client,
@@ -164,6 +165,7 @@ class BulletPlant:
         self.lap("drive")
         p.stepSimulation(physicsClientId=self._client)
         self.lap("physics")
+        self._slip = None
         self._t += PHYSICS_STEP
         self._unseen += 1
 
@@ -257,6 +259,7 @@ class BulletPlant:
         """Put the fingers `opening` metres apart at once: a run that goes on begins with what its hand was like."""
         for finger in self._finger_joints:
             p.resetJointState(self._robot, finger, opening / 2, physicsClientId=self._client)
+        self._slip = None
 
     def scale_masses(self, factor: float) -> None:
         """Make every moving link of the robot `factor` times as heavy as its model says, inertia included."""
@@ -340,11 +343,14 @@ class BulletPlant:
         self._arm_joints = [index[f"joint_{i}"] for i in range(1, 8)]
         self._finger_joints = [index["finger_left_slide"], index["finger_right_slide"]]
         self._sensor_joint = index["wrist_sensor"]
-        self._joints = [*self._arm_joints, *self._finger_joints, self._sensor_joint]
+        self._driven_joints = [*self._arm_joints, *self._finger_joints]
+        self._joints = [*self._driven_joints, self._sensor_joint]
         self._tcp_link = index["tcp_mount"]
         hand = p.getDynamicsInfo(self._robot, self._sensor_joint, physicsClientId=self._client)
-        self._lever = pin.skew(np.array(hand[3]))
+        self._lever = hand[3]
         self._tau = np.zeros(7)
+        # By how much the right finger is further out than the left, m, and moves faster, m/s; None until read.
+        self._slip: tuple[float, float] | None = None
         self._grip: tuple[float, float] | None = None
         self._tau_max = robot.tau_max
         self._max_grip_force = robot.gripper.max_force
@@ -375,3 +381,13 @@ class BulletPlant:
 
 def _nobody(part: str) -> None:
     """Takes no times."""
+
+
+@njit(cache=True)
+def _clip(values: np.ndarray, most: np.ndarray, clipped: np.ndarray) -> bool:
+    """Fill in the values, none beyond ±most. Are all finite?"""
+    total = 0.0
+    for i in range(len(values)):
+        total += values[i]
+        clipped[i] = min(max(values[i], -most[i]), most[i])
+    return math.isfinite(total)

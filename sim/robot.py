@@ -109,8 +109,8 @@ class RobotModel:
 
     def X_WG(self, q: np.ndarray) -> SE3:
         """Pose of the gripper frame at configuration q (7,)."""
-        pin.framesForwardKinematics(self.model, self._data, q)
-        return SE3(self._data.oMf[self.tcp_id])
+        pin.forwardKinematics(self.model, self._data, q)
+        return SE3(pin.updateFramePlacement(self.model, self._data, self.tcp_id))
 
     def link_poses(self, q: np.ndarray, opening: float) -> dict[str, SE3]:
         """Poses X_WL of all links at q (7,), the fingers `opening` metres apart."""

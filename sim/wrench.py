@@ -1,5 +1,6 @@
 """A wrench with its frame: force and torque about that frame's origin, in that frame's axes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,3 +27,12 @@ class Wrench:
         """This wrench, given in B, expressed in A: X_AB is the pose of B in A."""
         force = X_AB.rotation @ self.force
         return Wrench(force, X_AB.rotation @ self.torque + np.cross(X_AB.translation, force))
+
+
+def felt_at_joint(reaction: Sequence[float], lever: Sequence[float]) -> Wrench:
+    """What a sensor in a joint reads, in the joint's frame: the opposite of the `reaction`, forces before torques, on
+    the link beyond it about a point `lever` (3,) m from the joint. PyBullet tells it so, about the centre of mass."""
+    x, y, z = -reaction[0], -reaction[1], -reaction[2]
+    a, b, c = lever
+    torque = (b * z - c * y - reaction[3], c * x - a * z - reaction[4], a * y - b * x - reaction[5])
+    return Wrench(np.array((x, y, z)), np.array(torque))

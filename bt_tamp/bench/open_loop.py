@@ -13,7 +13,7 @@ import pinocchio as pin
 from planner.motion.trajectory import Trajectory
 from sim.plant import Observation
 from sim.robot import RobotModel
-from skills.control.state import measure, target_at
+from skills.control.dynamics import Dynamics
 from skills.control.tasks import pose_error
 
 STIFFNESS = np.array([1000.0, 1000.0, 0.0, 50.0, 50.0, 50.0])
@@ -28,15 +28,15 @@ class OpenLoopHybrid:
     """Presses with `force` N along −z of W while the tool follows a trajectory in x, y and orientation."""
 
     def __init__(self, robot: RobotModel, trajectory: Trajectory, force: float, start: float) -> None:
-        self._robot, self._data = robot, robot.data()
+        self._robot, self._data, self._dynamics = robot, robot.data(), Dynamics(robot)
         self._trajectory, self._start = trajectory, start
         self._push = np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0])
 
     def update(self, observation: Observation) -> np.ndarray:
         """Torques (7,) in Nm for the next period."""
         q, v = observation.q, observation.v
-        target = target_at(self._robot, self._data, *self._trajectory.at(observation.t - self._start))
-        state = measure(self._robot, self._data, q, v)
+        target = self._dynamics.target(*self._trajectory.at(observation.t - self._start))
+        state = self._dynamics.state(q, v)
         gravity = pin.computeGeneralizedGravity(self._robot.model, self._data, q)
         wrench = STIFFNESS * pose_error(target, state) + DAMPING * (target.V - state.V) + self._push
         wrench[2] = self._push[2] - DAMPING[2] * state.V[2]

@@ -16,7 +16,7 @@ from planner.refinement import Pair
 from planner.task.planner import TaskPlanner
 from planner.task.symbols import NoTaskPlan, TaskPlan
 from sim.scene import SceneState
-from skills.control.osqp_ import Workspace
+from skills.control.osqp_ import Problem, Workspace
 from skills.control.torque_qp import SPARE_ROWS
 
 
@@ -28,14 +28,8 @@ class FailingSolver:
         self._status, self._spells, self._calls = status, spells, 0
         self._strike = strike
 
-    def solve(
-        self,
-        P: np.ndarray,
-        g: np.ndarray,
-        bounds: tuple[np.ndarray, np.ndarray],
-        rows: tuple[np.ndarray, np.ndarray, np.ndarray],
-    ) -> tuple[np.ndarray, str]:
-        x, status = self._real.solve(P, g, bounds, rows)
+    def solve(self, problem: Problem) -> tuple[np.ndarray, str]:
+        x, status = self._real.solve(problem)
         self._calls += 1
         if any(first <= self._calls < first + number for first, number in self._spells):
             self._strike()

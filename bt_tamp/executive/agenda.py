@@ -47,6 +47,7 @@ class Agenda:
         self.order, self.unseen = goal, late
         self._refinements: tuple[Refinement, ...] = ()
         self._running = 0
+        self._sound: tuple[int, bool, frozenset[Fact]] | None = None
 
     @property
     def goal(self) -> frozenset[Fact]:
@@ -94,7 +95,7 @@ class Agenda:
 
     def adopt(self, plan: TaskPlan, refinements: tuple[Refinement, ...], context: SkillContext, why: str) -> None:
         """Put a new plan in force: the old tree is stopped, then replaced."""
-        self.plan, self._refinements = plan, refinements
+        self.plan, self._refinements, self._sound = plan, refinements, None
         self._build_from(0, context, why)
 
     def drop(self) -> None:
@@ -114,14 +115,19 @@ class Agenda:
         if self.plan.goal != self.pursued(context.scene):
             return self._what_changed(context.scene)
         facts = self.facts(context.scene)
+        if (self._running, self.is_between_actions, facts) == self._sound:
+            return None
         if not self.is_between_actions:
-            good = still_good_while(self.plan, self._running, facts)
-            return None if good else f"after {self.running} the rest of the plan would no longer apply"
+            if not still_good_while(self.plan, self._running, facts):
+                return f"after {self.running} the rest of the plan would no longer apply"
+            self._sound = self._running, False, facts
+            return None
         k = resume_at(self.plan, facts)
         if k is None:
             return "what is left of the plan no longer leads to the goal"
         if k != self._running:
             self._build_from(k, context, "skipped" if k > self._running else "redone")
+        self._sound = self._running, True, facts
         return None
 
     def _what_changed(self, scene: SceneState) -> str:

@@ -1,6 +1,6 @@
 """From observations to the believed scene: where things are, and what the hand holds."""
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -39,9 +39,10 @@ class Belief:
     def __init__(self, scenario: Scenario, robot: RobotModel) -> None:
         self._scenario = self._declared = scenario
         self._robot = robot
+        self._lowest, self._highest = robot.q_min + OFF_STOP, robot.q_max - OFF_STOP
         self._held: str | None = None
         self._regions: Mapping[str, SE3] = {}
-        self._lying: dict[str, Sighting] = {}
+        self._lying = defaultdict[str, Sighting](Sighting)
         self._in_hand = Sighting()
         self._X_GO: SE3 | None = None
         self._known: dict[str, tuple[float, SE3]] = {}
@@ -74,14 +75,13 @@ class Belief:
 
     def _within_limits(self, q: np.ndarray) -> np.ndarray:
         """A joint that was pushed onto its stop, believed just off it: no motion could begin beyond a limit."""
-        return np.clip(q, self._robot.q_min + OFF_STOP, self._robot.q_max - OFF_STOP)
+        return np.minimum(np.maximum(q, self._lowest), self._highest)
 
     def _poses(self, observation: Observation) -> dict[str, SE3]:
         """Every body that is seen, or was a moment ago."""
         t, known = observation.t, self._known
         for name, X_WO in observation.poses.items():
-            sighting = self._lying.setdefault(name, Sighting())
-            known[name] = (t, sighting.see(X_WO, at_rest(observation.velocities[name])))
+            known[name] = (t, self._lying[name].see(X_WO, at_rest(observation.velocities[name])))
         patience = OVERLOOKED if observation.poses else REMEMBERED
         if self._was_blind and observation.poses:
             # What doesn't turn up again with the rest is looked for from now on.
@@ -127,14 +127,14 @@ class Belief:
         if abs(observation.opening_velocity) > FINGERS_AT_REST and self._held is None:
             return None
         pads = X_WG.act(np.array([0.0, 0.0, -PAD_DEPTH]))
-        bodies = self._declared.bodies
-        gaps = {name: distance_to(bodies[name].shape, X_WO.actInv(pads)) for name, X_WO in poses.items()}
-        if not gaps:
-            return None
-        if self._held is not None and gaps.get(self._held, np.inf) < KEEP_REACH:
+
+        def gap(name: str) -> float:
+            return distance_to(self._declared.bodies[name].shape, poses[name].actInv(pads))
+
+        if self._held is not None and self._held in poses and gap(self._held) < KEEP_REACH:
             return self._held
-        nearest = min(gaps, key=lambda name: gaps[name])
-        return nearest if gaps[nearest] < GRASP_REACH else None
+        nearest = min(poses, key=gap, default=None)
+        return nearest if nearest is not None and gap(nearest) < GRASP_REACH else None
 
 
 def distance_to(shape: Shape, p_O: np.ndarray) -> float:

@@ -7,7 +7,6 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 from py_trees.common import Status
 
 from bt_tamp.disturb.driver import Driver
@@ -199,8 +198,9 @@ def act(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally, n
     """Second half of control tick n: control, record, and let the world go on."""
     plant, context = machine.plant, machine.context
     tau = context.controller.update(context.observation)
+    limits = zip(tau.tolist(), machine.robot.tau_max.tolist(), strict=True)
     # Written so that a command of NaN is counted too.
-    tally.unlawful += not (np.abs(tau) <= machine.robot.tau_max).all()
+    tally.unlawful += not all(abs(torque) <= most for torque, most in limits)
     plant.apply(Command(tau, context.grip.command(context.observation)))
     plant.lap("apply")
     _account(machine, recorder, audits, tally, n)
@@ -219,7 +219,8 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
         contacts = machine.plant.contacts()
         audits.peaks.look(contacts, context)
     if is_due:
-        power = float(np.abs(observation.tau) @ np.abs(observation.v))
+        rates = zip(observation.tau.tolist(), observation.v.tolist(), strict=True)
+        power = sum(abs(torque * rate) for torque, rate in rates)
         tally.energy_j += power * SAMPLE_EVERY * CONTROL_EVERY * machine.plant.timestep
         reference = controller.reference
         wanted = reference.force if reference else 0.0

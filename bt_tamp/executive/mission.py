@@ -12,6 +12,7 @@ The outcome is judged by `goal reached?` alone; `act` coming to its end never en
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -117,5 +118,6 @@ def planning(lift_off: Behaviour, plan: Behaviour) -> Behaviour:
     return sequence("plan", lift_off, plan)
 
 
+@lru_cache(maxsize=64)
 def _still_missing(missing: frozenset[Fact]) -> str:
     return "missing: " + ", ".join(str(fact) for fact in sorted(missing))

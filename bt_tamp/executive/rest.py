@@ -18,4 +18,5 @@ def moving(observation: Observation) -> list[str]:
 
 def at_rest(V_WO: np.ndarray) -> bool:
     """Is something with this velocity (6,) at rest?"""
-    return math.hypot(*V_WO[:3]) <= REST_SPEED and math.hypot(*V_WO[3:]) <= REST_TURN
+    x, y, z, a, b, c = V_WO.tolist()
+    return math.hypot(x, y, z) <= REST_SPEED and math.hypot(a, b, c) <= REST_TURN

@@ -9,10 +9,11 @@ away(o)           o isn't where it is known to be in the way
 """
 
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Protocol
 
 from planner.support import supports
-from planner.task.layout import layout
+from planner.task.layout import Layout, layout
 from planner.task.pddl import Domain
 from planner.task.primitives import AWAY, GRASPABLE, STUCK
 from planner.task.symbols import Fact
@@ -47,24 +48,49 @@ def place_of(scene: SceneState, name: str) -> str | None:
     plate and the lowest point near its top, or on top of something there (but for crumbs: only what lies
     on the table itself can be wiped).
     """
+    return _place_of(scene, name, layout(scene.scenario))
+
+
+def _place_of(scene: SceneState, name: str, fixed: Layout) -> str | None:
     if (scene.held is not None and scene.held.name == name) or name not in scene.poses:
         return None
-    fixed = layout(scene.scenario)
     place = fixed.place_of(name, scene.poses[name])
     if place is not None or fixed.kinds[name] == "crumb" or not fixed.is_over_table(scene.poses[name]):
         return place
     beneath = supports(scene, name)
-    stands = any(other in scene.scenario.fixtures or place_of(scene, other) == TABLE for other in beneath)
+    stands = any(other in scene.scenario.fixtures or _place_of(scene, other, fixed) == TABLE for other in beneath)
     return TABLE if stands else None
 
 
 def observed_facts(scene: SceneState) -> frozenset[Fact]:
     """The facts that the scene alone decides."""
     fixed = layout(scene.scenario)
-    found = {Fact("hand_empty") if scene.held is None else Fact("holding", (scene.held.name,))}
-    found |= {Fact("is_sponge", (name,)) for name in fixed.sponges if name in scene.poses}
-    for name in scene.poses:
-        place = place_of(scene, name)
+    return _observed(fixed, *_places(scene, fixed))
+
+
+def facts(scene: SceneState, learned: Optimism) -> frozenset[Fact]:
+    """Everything that holds in the scene, given what failures have taught; the same set for the same."""
+    fixed = layout(scene.scenario)
+    known = learned.ungraspable(scene), learned.stuck(scene), learned.in_the_way(scene)
+    return _stated(fixed, *_places(scene, fixed), *known)
+
+
+_Places = tuple[tuple[str, str | None], ...]
+
+
+def _places(scene: SceneState, fixed: Layout) -> tuple[_Places, str | None]:
+    """Every body with its place, and what the hand holds."""
+    places = tuple([(name, _place_of(scene, name, fixed)) for name in scene.poses])
+    return places, None if scene.held is None else scene.held.name
+
+
+# Asked at every tick of the tree, and little of it changes from one to the next.
+@lru_cache(maxsize=64)
+def _observed(fixed: Layout, places: _Places, held: str | None) -> frozenset[Fact]:
+    found = {Fact("hand_empty") if held is None else Fact("holding", (held,))}
+    for name, place in places:
+        if name in fixed.sponges:
+            found.add(Fact("is_sponge", (name,)))
         if place is not None:
             found.add(Fact("in_bin", (name, place)))
         if place in fixed.bins:
@@ -72,14 +98,21 @@ def observed_facts(scene: SceneState) -> frozenset[Fact]:
     return frozenset(found)
 
 
-def facts(scene: SceneState, learned: Optimism) -> frozenset[Fact]:
-    """Everything that holds in the scene, given what failures have taught."""
-    kinds = layout(scene.scenario).kinds
-    solid = {name for name in scene.poses if kinds[name] != "crumb"}
-    graspable = {Fact(GRASPABLE, (name,)) for name in solid - learned.ungraspable(scene)}
-    stuck = {Fact(STUCK, (name,)) for name in solid & learned.stuck(scene)}
-    away = {Fact(AWAY, (name,)) for name in scene.poses.keys() - learned.in_the_way(scene)}
-    return observed_facts(scene) | graspable | stuck | away
+@lru_cache(maxsize=64)
+def _stated(
+    fixed: Layout,
+    places: _Places,
+    held: str | None,
+    ungraspable: frozenset[str],
+    stuck: frozenset[str],
+    in_the_way: frozenset[str],
+) -> frozenset[Fact]:
+    names = frozenset(name for name, _ in places)
+    solid = frozenset(name for name in names if fixed.kinds[name] != "crumb")
+    lying = {Fact(GRASPABLE, (name,)) for name in solid - ungraspable}
+    lying |= {Fact(STUCK, (name,)) for name in solid & stuck}
+    lying |= {Fact(AWAY, (name,)) for name in names - in_the_way}
+    return _observed(fixed, places, held) | lying
 
 
 def objects_of(scene: SceneState) -> dict[str, str]:

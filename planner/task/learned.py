@@ -112,14 +112,19 @@ class Learned:
         self._executed: dict[tuple[str, str], list[tuple[Any, bool]]] = {}
         self._seen: dict[str, Whereabouts | None] = {}
         self._is_lenient = False
+        self._forget_derived()
+
+    def _forget_derived(self) -> None:
+        """What is asked at every tick of the tree follows from the cases: it is worked out when it is asked for."""
         self._binding: frozenset[str] | None = None
+        self._graspless: frozenset[str] | None = None
 
     def learn(self, failure: RefinementFailure, situation: Situation, hinted: Collection[Any], tries: int) -> None:
         """Take in that an action can't be refined in a situation, with a budget of so many tries.
 
         `hinted` are the samples that were to be tried first: those not among the attempts are spent too.
         """
-        self._binding = None
+        self._forget_derived()
         if failure.proof == "anywhere":
             self._never[failure.action] = failure.reason
             return
@@ -140,7 +145,7 @@ class Learned:
 
         Returns whether the action counts as failed there now.
         """
-        self._binding = None
+        self._forget_derived()
         situation = Situation.now(scene)
         own = situation.spot(failure.action.args[0])
         case = self._cases.setdefault((failure.action, own), Case())
@@ -199,8 +204,10 @@ class Learned:
 
     def ungraspable(self, scene: SceneState) -> frozenset[str]:
         """Bodies known to have no grasp as they lie."""
-        found = {own.body for action, own in self._failed() if self._is_grasp_fact(action, own)}
-        return self._still_there(found, scene)
+        if self._graspless is None:
+            found = (own.body for action, own in self._failed() if self._is_grasp_fact(action, own))
+            self._graspless = frozenset(found)
+        return self._still_there(self._graspless, scene)
 
     def stuck(self, scene: SceneState) -> frozenset[str]:
         """Bodies that can't be taken up as they lie and must be moved otherwise first.
@@ -240,7 +247,8 @@ class Learned:
     def retract(self, tries: int) -> None:
         """Drop sampled facts established with fewer tries. Proofs stay; what failed in execution is still avoided, and
         an action that did so twice as often as it takes to count as failed is out as its object lies."""
-        self._is_lenient, self._binding = True, None
+        self._is_lenient = True
+        self._forget_derived()
         for key, case in list(self._cases.items()):
             if not case.is_proof and case.tries < tries:
                 executed = {sample: kept for sample, kept in case.samples.items() if kept.is_executed}
@@ -303,7 +311,7 @@ class Learned:
                 self._seen.setdefault(spot.body, whereabouts(situation.observed, spot.body))
 
     def _drop(self, is_gone: Callable[[Spot], bool]) -> None:
-        self._binding = None
+        self._forget_derived()
         self._cases = {key: case for key, case in self._cases.items() if not is_gone(key[1])}
         for case in self._cases.values():
             case.forget(is_gone)

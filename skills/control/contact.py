@@ -10,6 +10,7 @@ from sim.robot import GRAVITY, RobotModel
 from sim.wrench import Wrench
 from skills.control.force import smooth_step
 from skills.control.state import ArmState
+from skills.control.vectors import cross, turn, turn_back
 
 SMOOTHING = 0.02
 """Time constant in seconds of the smoothed wrench."""
@@ -29,7 +30,8 @@ STUCK = 0.02
 
 
 class ContactWrench:
-    """Wrench that the world exerts on the tool, at G in W axes (6,): `raw`, and `smooth` (low-passed).
+    """Wrench that the world exerts on the tool, at G in W axes (6,): `raw`; `smooth`, low-passed; and `credible`, which
+    is `raw` as far as it is more than the sensor's own error.
 
     The sensor also feels the weight and inertia of the hand and its load: both are taken off. The
     acceleration is the difference of measured velocities: one predicted by the model would miss what
@@ -48,8 +50,7 @@ class ContactWrench:
         self._taring: _Mean | None = None
         self._told: tuple[float, ...] = ()
         self._stuck = 0.0
-        self.raw = np.zeros(6)
-        self.smooth = np.zeros(6)
+        self.raw, self.smooth, self.credible = np.zeros(6), np.zeros(6), np.zeros(6)
         self.is_silent = False
 
     def carry(self, load: pin.Inertia | None) -> None:
@@ -72,28 +73,19 @@ class ContactWrench:
         if last is None:
             return
         told = (*wrist.force.tolist(), *wrist.torque.tolist())
-        is_missing = not math.isfinite(math.fsum(told))
         self._stuck = self._stuck + self._period if told == self._told else 0.0
         self._told = told
-        self.is_silent = is_missing or self._stuck > STUCK
-        if is_missing:
+        contact, body, motion = np.empty(6), self._body, (state.J, state.drift, state.V, state.R)
+        is_number = _contact_wrench(
+            last, state.v, self._period, *motion, *body, wrist.force, wrist.torque, self._bias_G, contact
+        )
+        self.is_silent = not is_number or self._stuck > STUCK
+        if not is_number:
             return
-        contact = np.empty(6)
-        a = (state.v - last) / self._period
-        _contact_wrench(state.J, a, state.drift, state.V, state.R, *self._body, wrist.force, wrist.torque, contact)
-        contact -= self._bias_G
         if self._taring is not None:
             contact = self._go_on_taring(self._taring, contact)
-        self.raw, self.smooth = np.empty(6), np.empty(6)
-        _smooth(contact, self._blend, state.R, self._smooth_G, self.raw, self.smooth)
-
-    @property
-    def credible(self) -> np.ndarray:
-        """`raw` (6,) as far as it is more than the sensor's own error: nothing below half of SENSOR_ERROR."""
-        x, y, z, a, b, c = self.raw.tolist()
-        force, torque = math.sqrt(x * x + y * y + z * z), math.sqrt(a * a + b * b + c * c)
-        size = max(force / SENSOR_ERROR[0], torque / SENSOR_ERROR[1])
-        return self.raw * smooth_step(2.0 * size - 1.0)
+        self.raw, self.smooth, self.credible = np.empty(6), np.empty(6), np.empty(6)
+        _smooth(contact, self._blend, state.R, self._smooth_G, self.raw, self.smooth, self.credible)
 
     def _go_on_taring(self, mean: "_Mean", contact: np.ndarray) -> np.ndarray:
         force = self._smooth_G[:3]
@@ -165,7 +157,38 @@ def hand_inertia(robot: RobotModel) -> pin.Inertia:
 
 
 @njit(cache=True)
-def _smooth(contact, blend, R, smooth_G, raw, smooth):
+def along(normal: np.ndarray, wrench: np.ndarray) -> float:
+    """The part in N along `normal` (3,), a unit vector, of the force of a wrench (6,)."""
+    return normal[0] * wrench[0] + normal[1] * wrench[1] + normal[2] * wrench[2]
+
+
+def with_force_along(normal: np.ndarray, force: float, wrench: np.ndarray) -> np.ndarray:
+    """The wrench (6,) with a force of so many N along `normal` (3,), a unit vector, in place of its own."""
+    changed = np.empty(6)
+    _put_along(normal, force, wrench, changed)
+    return changed
+
+
+@njit(cache=True)
+def _put_along(normal, force, wrench, changed):
+    missing = force - along(normal, wrench)
+    for i in range(3):
+        changed[i] = wrench[i] + normal[i] * missing
+        changed[3 + i] = wrench[3 + i]
+
+
+@njit(cache=True)
+def _believe(raw, credible):
+    """Nothing below half of SENSOR_ERROR, everything above it."""
+    force = math.sqrt(raw[0] ** 2 + raw[1] ** 2 + raw[2] ** 2)
+    torque = math.sqrt(raw[3] ** 2 + raw[4] ** 2 + raw[5] ** 2)
+    share = smooth_step(2.0 * max(force / SENSOR_ERROR[0], torque / SENSOR_ERROR[1]) - 1.0)
+    for i in range(6):
+        credible[i] = share * raw[i]
+
+
+@njit(cache=True)
+def _smooth(contact, blend, R, smooth_G, raw, smooth, credible):
     """Blend the wrench `contact` (6,), in G, into `smooth_G`, and turn both into W's axes: `raw` and `smooth`."""
     for i in range(6):
         smooth_G[i] += blend * (contact[i] - smooth_G[i])
@@ -175,33 +198,34 @@ def _smooth(contact, blend, R, smooth_G, raw, smooth):
             for j in range(3):
                 raw[part + i] += R[i, j] * contact[part + j]
                 smooth[part + i] += R[i, j] * smooth_G[part + j]
+    _believe(raw, credible)
 
 
 @njit(cache=True)
-def _contact_wrench(J, a, drift, V, R, mass, lever, inertia, R_GE, p_GE, force, torque, contact):
+def _contact_wrench(
+    v_before, v, period, J, drift, V, R, mass, lever, inertia, R_GE, p_GE, force, torque, bias_G, contact
+):
     """What acts on the tool from outside (6,), about G in its axes: what the sensor feels (force, torque in E) less
-    weight and inertia of the body beyond it, by Newton and Euler."""
-    lift, swing, spin = np.empty(3), np.empty(3), np.empty(3)
+    weight and inertia of the body beyond it, by Newton and Euler, and less its bias. False if it feels no number."""
+    total = 0.0
     for i in range(3):
-        # Accelerations of G, in G's axes; gravity counts as an acceleration upwards.
-        lift[i] = swing[i] = spin[i] = 0.0
-        for k in range(3):
-            linear, angular = drift[k], drift[3 + k]
-            for j in range(7):
-                linear += J[k, j] * a[j]
-                angular += J[3 + k, j] * a[j]
-            if k == 2:
-                linear += GRAVITY
-            lift[i] += R[k, i] * linear
-            swing[i] += R[k, i] * angular
-            spin[i] += R[k, i] * V[3 + k]
-    centre = lift + _cross(swing, lever) + _cross(spin, _cross(spin, lever))
-    turning = inertia @ swing + _cross(spin, inertia @ spin)
-    felt = R_GE @ force
-    contact[:3] = felt + mass * centre
-    contact[3:] = R_GE @ torque + _cross(p_GE, felt) + turning + mass * _cross(lever, centre)
-
-
-@njit(cache=True)
-def _cross(a, b):
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+        total += force[i] + torque[i]
+    if not math.isfinite(total):
+        return False
+    # Accelerations of G, linear before angular; gravity counts as an acceleration upwards.
+    rates = np.empty(6)
+    for k in range(6):
+        rates[k] = drift[k]
+        for j in range(7):
+            rates[k] += J[k, j] * (v[j] - v_before[j]) / period
+    rates[2] += GRAVITY
+    lift, swing, spin = turn_back(R, rates[:3]), turn_back(R, rates[3:]), turn_back(R, V[3:])
+    swung, spun = cross(swing, lever), cross(spin, cross(spin, lever))
+    centre = (lift[0] + swung[0] + spun[0], lift[1] + swung[1] + spun[1], lift[2] + swung[2] + spun[2])
+    rolling, gyration, thrown = turn(inertia, swing), cross(spin, turn(inertia, spin)), cross(lever, centre)
+    push, twist = turn(R_GE, force), turn(R_GE, torque)
+    pried = cross(p_GE, push)
+    for i in range(3):
+        contact[i] = push[i] + mass * centre[i] - bias_G[i]
+        contact[3 + i] = twist[i] + pried[i] + rolling[i] + gyration[i] + mass * thrown[i] - bias_G[3 + i]
+    return True

@@ -13,25 +13,17 @@ from sim.plant import Observation
 from sim.robot import RobotModel
 from sim.wrench import Wrench
 from skills.control.bridge import Bridge
-from skills.control.contact import ContactWrench, Touch
+from skills.control.contact import ContactWrench, Touch, along
 from skills.control.cushion import cushion
-from skills.control.force import ForceLoop, smooth_step
-from skills.control.limits import ApproachLimit, Row
-from skills.control.momentum import MomentumObserver
+from skills.control.dynamics import Dynamics
+from skills.control.force import ForceLoop
+from skills.control.laws import Law, comply, give_way, lowered, press, seek, track
+from skills.control.momentum import Compensation, MomentumObserver
 from skills.control.osqp_ import Solver
 from skills.control.reference import Course, Reference, near_contact
 from skills.control.safety import Collision, ForceTooHigh, Guard, SafetyLimits, Stop
-from skills.control.state import ArmState, Target, measure, target_at
-from skills.control.tasks import (
-    LANDING_DAMPING,
-    SINK_DAMPING,
-    HybridTask,
-    JointTask,
-    PoseTask,
-    PostureTask,
-    Task,
-    pose_error,
-)
+from skills.control.state import ArmState
+from skills.control.tasks import pose_error
 from skills.control.torque_qp import TorqueQP, nobody
 
 LOST_AFTER = 0.014
@@ -39,13 +31,6 @@ LOST_AFTER = 0.014
 
 LOST_AFTER_TOUCH = 0.25
 """The same while touching down, when the tool may bounce."""
-
-GUARDED, GUARDED_DAMPING = 400.0, 25.0
-"""Gains in 1/s² and 1/s on the way to contact: low, for what a hard surface does to the velocity comes back as
-torque at once, and until the touch is noticed the arm goes on pressing with the stiffness."""
-
-LANDING = 0.12
-"""Seconds after touching in which bouncing is damped."""
 
 PRESSED_SETTLING = 0.1
 """Seconds that the force is left to settle after it was ramped up."""
@@ -60,21 +45,9 @@ APPROACH_SPEED = 0.02
 """Metres per second at which a reference until contact meets a surface: a stiff one answers with a force of
 speed · √(stiffness · moved mass), 5 N for the sponge."""
 
-APPROACH_LIMIT = 0.06
-"""Metres per second towards the surface that the QP allows while contact is sought or kept."""
-
-COMPENSATED = 0.25
-"""Share of each joint's torque that may go into what the model lacks."""
-
-COMPENSATION_RATE = 150.0
-"""Nm/s at which that may change: joint friction turns round within 20 ms."""
-
 STOPPING, STOPPING_LADEN = 2.0, 1.3
 """Times the acceleration of planned motions with which the arm may brake when it is told to hold, with nothing in the
 hand and with something, which must not slip."""
-
-YIELDING, YIELDING_DAMPING = 100.0, 30.0
-"""1/s² and 1/s with which the arm holds after a collision: it gives way."""
 
 
 @dataclass(frozen=True)
@@ -106,12 +79,12 @@ class ArmController:
     ) -> None:
         self._unloaded = self._robot = robot
         self._period = period
-        self._data = robot.data()
+        self._dynamics = Dynamics(robot)
         self.lap: Callable[[str], None] = nobody
         self._qp = TorqueQP(robot, period, lambda part: self.lap(part), solver)
         self._observer = MomentumObserver(period)
         self._guard = Guard(safety or SafetyLimits(), robot.tau_max, period)
-        self._compensated = COMPENSATED * robot.tau_max
+        self._compensation = Compensation(robot.tau_max, period)
         self._wrench = ContactWrench(robot, period)
         self._touch = Touch(period)
         self._loop = ForceLoop(period)
@@ -127,7 +100,6 @@ class ArmController:
         self._anchor = 0.0
         self._without_contact = 0.0
         self._slowed = 1.0
-        self._lacking = np.zeros(7)
         self._unexplained: np.ndarray | None = None
         self.contact_lost = False
         self.stopped: Stop | None = None
@@ -163,7 +135,7 @@ class ArmController:
         self._use(self._unloaded, None)
 
     def _use(self, robot: RobotModel, load: pin.Inertia | None) -> None:
-        self._robot, self._data = robot, robot.data()
+        self._robot, self._dynamics = robot, Dynamics(robot)
         self._wrench.carry(load)
         self._observer.change_model()
         self._law_changed = True
@@ -205,7 +177,7 @@ class ArmController:
     @property
     def contact_force(self) -> float:
         """Smoothed normal force in N along the contact frame's z axis; pressing is positive."""
-        return float(self._normal @ self._wrench.smooth[:3])
+        return along(self._normal, self._wrench.smooth)
 
     @property
     def felt(self) -> float:
@@ -228,7 +200,7 @@ class ArmController:
         if self._state is None:
             return TrackingError(0.0, 0.0, 0.0)
         q, v, a = self._course.now()
-        error = pose_error(target_at(self._robot, self._data, q, v, a), self._state)
+        error = pose_error(self._dynamics.target(q, v, a), self._state)
         if self._pressed:
             error[:3] -= self._normal * (self._normal @ error[:3])
         joint = float(np.abs(q - self._state.q).max())
@@ -265,11 +237,12 @@ class ArmController:
 
     def update(self, observation: Observation) -> np.ndarray:
         """Torques (7,) in Nm for the next period."""
-        state = measure(self._robot, self._data, observation.q, observation.v)
+        state = self._dynamics.state(observation.q, observation.v)
         self._state = state
         self.lap("model")
         self._wrench.update(state, observation.wrist)
-        self._observer.update(state.M, state.bias, state.v, observation.tau, state.J.T @ self._wrench.credible)
+        felt = state.torques_of(self._wrench.credible)
+        self._observer.update(state.M, state.bias, state.v, observation.tau, felt)
         if self._pending is not None:
             self._begin(self._pending, state)
         elif self._hold_pending:
@@ -279,12 +252,10 @@ class ArmController:
         if self._law_changed:
             self._bridge.drop()
         self.lap("state")
-        tasks, wrench, limits = self._law(state)
-        feedforward = self._bridge.advance() - state.J.T @ wrench - self._compensation()
-        if self._unexplained is not None:
-            feedforward += cushion(state, self._robot)
+        law = self._law()
+        feedforward = self._feedforward(state, law.wrench)
         self.lap("law")
-        solution = self._qp.solve(state, tasks, feedforward, limits)
+        solution = self._qp.solve(state, law.tasks, feedforward, law.limits)
         self._course.advance(self._period)
         tau = solution.tau
         if self._law_changed and self._tau is not None:
@@ -300,7 +271,7 @@ class ArmController:
         self._reference, self._pending = reference, None
         self._slowed, trajectory = 1.0, reference.trajectory
         if reference.until_contact:
-            self._slowed = near_contact(self._robot, self._data, reference, APPROACH_SPEED)
+            self._slowed = near_contact(self._dynamics, reference, APPROACH_SPEED)
             trajectory = trajectory.slowed(self._slowed)
         self._course = Course.joined(trajectory, state.q, state.v, self._robot.a_max)
         self._law_changed = True
@@ -316,13 +287,6 @@ class ArmController:
         self._law_changed = True
         self._pressed = False
 
-    def _compensation(self) -> np.ndarray:
-        """Torques (7,) taken for the model's errors. They change slowly enough for an impact, which the observer
-        and the sensor see at slightly different times, to make no step."""
-        wanted = self._observer.unmodelled if self._unexplained is None else self._unexplained
-        _creep(wanted, self._compensated, COMPENSATION_RATE * self._period, self._lacking)
-        return self._lacking
-
     def _stop(self, reason: Stop, state: ArmState) -> None:
         self.stopped = reason
         self._begin_hold(state)
@@ -335,11 +299,10 @@ class ArmController:
         if self.stopped is not None:
             return
         guard, reference = self._guard, self._reference
-        reason = guard.speed(state.V) or guard.force(self._wrench.raw[:3]) or guard.sudden(self._observer.sudden)
+        tau = _NO_TORQUE if self._tau is None else self._tau
+        reason = guard.look(state.V, self._wrench.raw, self._observer.sudden, tau)
         if reason is None and reference is not None and reference.force > 0.0:
             reason = guard.sensor(self._wrench.is_silent)
-        if reason is None and self._tau is not None:
-            reason = guard.torque(self._tau)
         if reason is not None:
             self._stop(reason, state)
 
@@ -348,11 +311,11 @@ class ArmController:
         self._without_contact = 0.0
         self._anchor = float(reference.normal @ state.p)
         if not keep_loop:
-            self._loop.reset(max(float(reference.normal @ self._wrench.raw[:3]), 0.0))
+            self._loop.reset(max(along(reference.normal, self._wrench.raw), 0.0))
         self._loop.aim(reference.force)
 
     def _watch_contact(self, state: ArmState) -> None:
-        self._touch.update(float(self._normal @ self._wrench.raw[:3]))
+        self._touch.update(along(self._normal, self._wrench.raw))
         reference = self._reference
         if reference is None or reference.force == 0.0:
             return
@@ -366,53 +329,39 @@ class ArmController:
             self.contact_lost = True
             self._begin_hold(state)
 
-    def _law(self, state: ArmState) -> tuple[list[Task], np.ndarray, tuple[Row, ...]]:
-        """The tasks of this instant, the wrench (6,) on the tool, in W, that they rely on, and limits of their own."""
-        reference = self._reference
-        joints = self._course.now()
+    def _law(self) -> Law:
+        """What is asked for at this instant."""
+        reference, joints = self._reference, self._course.now()
         if self._unexplained is not None:
-            return [JointTask(*joints, YIELDING_DAMPING, YIELDING)], _NO_WRENCH, ()
+            return give_way(joints)
         if reference is None or reference.mode == "position":
-            return [JointTask(*joints)], _NO_WRENCH, ()
-        limits = (ApproachLimit(reference.normal, APPROACH_LIMIT),) if reference.force > 0.0 else ()
+            return track(joints)
         if reference.mode == "hybrid" and not self._pressed:
-            return [JointTask(*joints, GUARDED_DAMPING, GUARDED)], _NO_WRENCH, limits
-        target = target_at(self._robot, self._data, *joints)
-        posture = PostureTask(*joints)
-        normal = reference.normal
-        felt = self._wrench
+            return seek(joints, reference)
+        target = self._dynamics.target(*joints)
         if reference.mode == "hybrid":
-            wrench = felt.smooth.copy()
-            force = self._loop.update(float(normal @ felt.raw[:3]))
-            wrench[:3] += normal * (force - normal @ wrench[:3])
-            landed = smooth_step(self._loop.time / LANDING) if reference.until_contact else 1.0
-            damping = LANDING_DAMPING + (SINK_DAMPING - LANDING_DAMPING) * landed
-            return [HybridTask(target, reference.R_WC, reference.damping * damping), posture], wrench, limits
-        assert reference.stiffness is not None
+            return press(joints, target, reference, self._wrench, self._loop)
         if self._pressed:
-            target = self._pressed_target(target, reference)
-        return [PoseTask(target, reference.stiffness, self._period, reference.damping), posture], _NO_WRENCH, limits
+            self._loop.update(self._loop.wanted)
+            target = lowered(target, reference, self._loop.wanted, self._anchor)
+        return comply(joints, target, reference, self._period)
 
-    def _pressed_target(self, target: Target, reference: Reference) -> Target:
-        """The target in the plane through the touched point, below it by force over stiffness."""
-        assert reference.stiffness is not None
-        normal = reference.normal
-        self._loop.update(self._loop.wanted)
-        depth = self._loop.wanted / float(normal**2 @ reference.stiffness[:3])
-        along = np.outer(normal, normal)
-        V, A = target.V.copy(), target.A.copy()
-        V[:3] -= along @ V[:3]
-        A[:3] -= along @ A[:3]
-        return Target(target.p + normal * (self._anchor - depth - normal @ target.p), target.R, V, A)
+    def _feedforward(self, state: ArmState, wrench: np.ndarray) -> np.ndarray:
+        """Torques (7,) on top of the model's: what bridges a change of law, bears the wrench, makes up for errors."""
+        lacking = self._observer.unmodelled if self._unexplained is None else self._unexplained
+        feedforward = state.torques_of(wrench)
+        _sum_up(self._bridge.advance(), self._compensation.advance(lacking), feedforward)
+        if self._unexplained is not None:
+            feedforward += cushion(state, self._robot)
+        return feedforward
 
 
 _UP = np.array([0.0, 0.0, 1.0])
-_NO_WRENCH = np.zeros(6)
+_NO_TORQUE = np.zeros(7)
 
 
 @njit(cache=True)
-def _creep(wanted: np.ndarray, bound: np.ndarray, most: float, value: np.ndarray) -> None:
-    """Move `value` (7,) by at most `most` towards `wanted`, which counts up to `bound`."""
-    for i in range(len(value)):
-        goal = min(max(wanted[i], -bound[i]), bound[i])
-        value[i] += min(max(goal - value[i], -most), most)
+def _sum_up(bridge: np.ndarray, lacking: np.ndarray, torques: np.ndarray) -> None:
+    """From the torques (7,) of a wrench on the tool to those that balance it."""
+    for i in range(len(torques)):
+        torques[i] = bridge[i] - torques[i] - lacking[i]

@@ -1,5 +1,7 @@
 """Closed-loop force along one direction: F = f_d + K_i ∫ (f_d − f) dt on the measured force f."""
 
+from numba import njit
+
 INTEGRAL_GAIN = 4.0
 """K_i in 1/s."""
 
@@ -10,6 +12,7 @@ SHORTEST_RAMP, LONGEST_RAMP = 0.15, 0.35
 """Seconds."""
 
 
+@njit(cache=True)
 def smooth_step(s: float) -> float:
     """0 for s ≤ 0, 1 for s ≥ 1, and a cubic with level ends between."""
     s = min(max(s, 0.0), 1.0)

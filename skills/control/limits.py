@@ -7,8 +7,7 @@ of them asks for more than that deceleration, they never contradict each other, 
 """
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
@@ -30,11 +29,19 @@ class Bound(Protocol):
         ...
 
 
-class Row(Protocol):
-    """A limit on combinations of joint accelerations."""
+class Block(NamedTuple):
+    """Limits lower ≤ R q̈ ≤ upper with R (m,7) and bounds (m,), to be filled row by row."""
 
-    def rows(self, state: ArmState, feedforward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """R (k,7) and bounds (k,) each of lower ≤ R q̈ ≤ upper."""
+    R: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+class Row(Protocol):
+    """A limit on one combination of joint accelerations."""
+
+    def fill(self, state: ArmState, block: Block, row: int) -> None:
+        """Write that row of the block."""
         ...
 
 
@@ -81,23 +88,20 @@ class TorqueLimits:
         self._inside = tau_max * (1.0 - self.margin)
         self._scale = 1.0 / tau_max
 
-    def rows(self, state: ArmState, feedforward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The torques M q̈ + h + f, in shares of each joint's limit."""
-        R, lower, upper = np.empty((7, 7)), np.empty(7), np.empty(7)
-        _torque_rows(state.M, state.bias, feedforward, self._inside, self._scale, R, lower, upper)
-        return R, lower, upper
+    def fill(self, state: ArmState, feedforward: np.ndarray, block: Block) -> None:
+        """Write the first seven rows of the block: the torques M q̈ + h + f, in shares of each joint's limit."""
+        _torque_rows(state.M, state.bias, feedforward, self._inside, self._scale, *block)
 
     def broken(self, tau: np.ndarray) -> bool:
         """Whether any torque of tau (7,) lies beyond its limit."""
-        return bool((np.abs(tau) > self.tau_max).any())
+        return _any_beyond(tau, self.tau_max)
 
     def clip(self, tau: np.ndarray) -> np.ndarray:
         """Bring tau (7,) within the limits, joint by joint."""
         return np.clip(tau, -self._inside, self._inside)
 
 
-@dataclass(frozen=True, slots=True)
-class ApproachLimit:
+class ApproachLimit(NamedTuple):
     """The tool comes no faster than `speed` m/s against `normal` (3,), a unit vector in W.
 
     Kept by nᵀ(J q̈ + J̇ q̇) ≥ −(speed + nᵀ v) / HORIZON: an excess fades, the way a barrier function does it
@@ -107,17 +111,12 @@ class ApproachLimit:
     normal: np.ndarray
     speed: float
 
-    def rows(self, state: ArmState, feedforward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        R, least = np.empty((1, 7)), np.empty(1)
-        _approach_row(self.normal, self.speed, state.V, state.J, state.drift, R, least)
-        return R, least, _UNBOUNDED
+    def fill(self, state: ArmState, block: Block, row: int) -> None:
+        _approach_row(self.normal, self.speed, state.V, state.J, state.drift, *block, row)
 
 
 APPROACH_HORIZON = 0.01
 """Seconds within which an excess of approach speed shall fade."""
-
-
-_UNBOUNDED = np.full(1, FREE)
 
 
 @njit(cache=True)
@@ -146,14 +145,30 @@ def _torque_rows(
 
 
 @njit(cache=True)
+def _any_beyond(values: np.ndarray, limits: np.ndarray) -> bool:
+    excess = 0.0
+    for i in range(len(values)):
+        excess = max(excess, abs(values[i]) - limits[i])
+    return excess > 0.0
+
+
+@njit(cache=True)
 def _approach_row(
-    n: np.ndarray, speed: float, V: np.ndarray, J: np.ndarray, drift: np.ndarray, R: np.ndarray, least: np.ndarray
+    n: np.ndarray,
+    speed: float,
+    V: np.ndarray,
+    J: np.ndarray,
+    drift: np.ndarray,
+    R: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    row: int,
 ) -> None:
     v = n[0] * V[0] + n[1] * V[1] + n[2] * V[2]
     a = n[0] * drift[0] + n[1] * drift[1] + n[2] * drift[2]
-    least[0] = -(speed + v) / APPROACH_HORIZON - a
+    lower[row], upper[row] = -(speed + v) / APPROACH_HORIZON - a, FREE
     for j in range(7):
-        R[0, j] = n[0] * J[0, j] + n[1] * J[1, j] + n[2] * J[2, j]
+        R[row, j] = n[0] * J[0, j] + n[1] * J[1, j] + n[2] * J[2, j]
 
 
 @njit(cache=True)

@@ -12,6 +12,12 @@ from numba import njit
 GAIN = 60.0
 """K in 1/s: torques from outside are seen with a time constant of 17 ms."""
 
+COMPENSATED = 0.25
+"""Share of each joint's torque that may go into what the model lacks."""
+
+COMPENSATION_RATE = 150.0
+"""Nm/s at which that may change: joint friction turns round within 20 ms."""
+
 SLOW = 4.0
 """1/s: what changes more slowly than this counts as an error of the model rather than an event."""
 
@@ -33,9 +39,7 @@ class MomentumObserver:
     def reset(self) -> None:
         """Forget everything: nothing acts from outside."""
         self._last = None
-        self._all = np.zeros(7)
-        self._sensed = np.zeros(7)
-        self._lasting = np.zeros(7)
+        self._filtered = np.zeros((3, 7))
         self.unmodelled = np.zeros(7)
         self.sudden = np.zeros(7)
 
@@ -51,14 +55,37 @@ class MomentumObserver:
             return
         self.unmodelled, self.sudden = np.empty(7), np.empty(7)
         rates = (self._period, self._blend, self._creep)
-        state = (self._all, self._sensed, self._lasting, self.unmodelled, self.sudden)
-        _observe(*last, M, bias, v, tau, sensed, rates, state)
+        _observe(*last, M, bias, v, tau, sensed, *rates, self._filtered, self.unmodelled, self.sudden)
+
+
+class Compensation:
+    """Torques (7,) in Nm taken for the model's errors. They change slowly enough for an impact, which the observer and
+    the sensor see at slightly different times, to make no step."""
+
+    def __init__(self, tau_max: np.ndarray, period: float) -> None:
+        self._bound = COMPENSATED * tau_max
+        self._step = COMPENSATION_RATE * period
+        self._torque = np.zeros(7)
+
+    def advance(self, wanted: np.ndarray) -> np.ndarray:
+        """The torques (7,) after one more period, in which `wanted` (7,) was what the model lacks."""
+        _creep(wanted, self._bound, self._step, self._torque)
+        return self._torque
 
 
 @njit(cache=True)
-def _observe(M_before, bias_before, v_before, M, bias, v, tau, sensed, rates, state):
-    period, blend, creep = rates
-    everything, from_sensor, lasting, unmodelled, sudden = state
+def _creep(wanted: np.ndarray, bound: np.ndarray, most: float, value: np.ndarray) -> None:
+    """Move `value` (7,) by at most `most` towards `wanted`, which counts up to `bound`."""
+    for i in range(len(value)):
+        goal = min(max(wanted[i], -bound[i]), bound[i])
+        value[i] += min(max(goal - value[i], -most), most)
+
+
+@njit(cache=True)
+def _observe(
+    M_before, bias_before, v_before, M, bias, v, tau, sensed, period, blend, creep, filtered, unmodelled, sudden
+):
+    everything, from_sensor, lasting = filtered
     for i in range(len(v)):
         # Over one period p changes by M̄ Δq̇ + ΔM q̇̄, and the second part is the integral of Ṁ q̇.
         gained = 0.0

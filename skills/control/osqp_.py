@@ -7,7 +7,7 @@ active the optimum is that of P x = −g, found by Cholesky, and OSQP is left al
 """
 
 import math
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import osqp
@@ -47,17 +47,21 @@ class _LeanOSQP(osqp.OSQP):
         return self._solver.info.status
 
 
+class Problem(NamedTuple):
+    """A QP in numbers: P (n,n) positive definite, g (n,), R (m,n); lower and upper (n + m,) bound x, then R x."""
+
+    P: np.ndarray
+    g: np.ndarray
+    R: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+
 class Solver(Protocol):
     """Solves the controller's QP."""
 
-    def solve(
-        self,
-        P: np.ndarray,
-        g: np.ndarray,
-        bounds: tuple[np.ndarray, np.ndarray],
-        rows: tuple[np.ndarray, np.ndarray, np.ndarray],
-    ) -> tuple[np.ndarray, str]:
-        """X (n,) and a status in words; x means nothing unless that is "solved"."""
+    def solve(self, problem: Problem) -> tuple[np.ndarray, str]:
+        """A new x (n,) and a status in words; x means nothing unless that is "solved"."""
         ...
 
 
@@ -73,37 +77,20 @@ class Workspace:
         per_column = rows + 1
         is_row = np.arange(per_column * size) % per_column > 0
         self._row_entries = np.flatnonzero(is_row).astype(np.int32)
-        self._lower = np.empty(size + rows)
-        self._upper = np.empty(size + rows)
-        self._size = size
+        self._size, self._bounds = size, size + rows
         self._resting: np.ndarray | None = None
         self._no_multipliers = np.zeros(size + rows)
         self._set_up()
 
     def _set_up(self) -> None:
         self._solver = _LeanOSQP()
-        bound = np.ones(len(self._lower))
+        bound = np.ones(self._bounds)
         self._solver.setup(self._pattern_P, np.zeros(self._size), self._pattern_A, -bound, bound, **self._settings)
 
-    def solve(
-        self,
-        P: np.ndarray,
-        g: np.ndarray,
-        bounds: tuple[np.ndarray, np.ndarray],
-        rows: tuple[np.ndarray, np.ndarray, np.ndarray],
-    ) -> tuple[np.ndarray, str]:
-        """Solve with P (n,n) positive definite, g (n,), bounds (lower, upper) (n,) each and
-        rows (R (m,n), row_lower (m,), row_upper (m,)).
-
-        Returns x (n,) and OSQP's status in words; x means nothing unless that is "solved".
-        """
-        R, row_lower, row_upper = rows
-        n = self._size
-        lower, upper = self._lower, self._upper
-        lower[:n], lower[n:] = bounds[0], row_lower
-        upper[:n], upper[n:] = bounds[1], row_upper
-        x = np.zeros(n)
-        start = _examine(P, g, R, lower, upper, x)
+    def solve(self, problem: Problem) -> tuple[np.ndarray, str]:
+        """Returns x (n,) and OSQP's status in words; x means nothing unless that is "solved"."""
+        x = np.zeros(self._size)
+        start = _examine(*problem, x)
         # OSQP ignores bounds that cross and answers with the previous problem's optimum; a NaN
         # stays in its iterates for good.
         if start == _CROSSED:
@@ -112,8 +99,9 @@ class Workspace:
             return x, "problem not finite"
         if start == _FREE:
             # Exact, and most ticks are like this: the solver is for those on which a limit matters.
-            self._resting = x.copy()
+            self._resting = x
             return x, SOLVED
+        P, g, R, lower, upper = problem
         self._solver.load(g, lower, upper, P[self._triangle], R.T.ravel(), self._row_entries)
         if self._resting is not None:
             self._solver.warm_start(self._resting, self._no_multipliers)

@@ -1,13 +1,13 @@
 """What the controller is asked to follow, and where along it the arm should be now."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import pinocchio as pin
 
 from planner.motion.trajectory import Trajectory
-from sim.robot import RobotModel
+from skills.control.dynamics import Dynamics
 
 Mode = Literal["position", "impedance", "hybrid"]
 
@@ -62,21 +62,18 @@ class Reference:
             if stiffness.shape != (6,) or not (stiffness > 0.0).all():
                 raise ValueError(f"impedance needs six positive stiffnesses, got {self.stiffness}")
 
-    @property
+    @cached_property
     def normal(self) -> np.ndarray:
         """The surface's outward normal (3,) in W."""
-        return self.R_WC[:, 2]
+        return np.ascontiguousarray(self.R_WC[:, 2])
 
 
-def near_contact(robot: RobotModel, data: pin.Data, reference: Reference, speed: float) -> float:
+def near_contact(dynamics: Dynamics, reference: Reference, speed: float) -> float:
     """How many times longer the reference's trajectory must take (1 or more) for the tool nowhere to come faster
-    than `speed` m/s against the surface. `data` is overwritten."""
-    trajectory, model, tool = reference.trajectory, robot.model, robot.tcp_id
-    fastest = speed
+    than `speed` m/s against the surface."""
+    trajectory, fastest = reference.trajectory, speed
     for t in np.linspace(0.0, trajectory.duration, 25):
-        q, v, _ = trajectory.at(t)
-        J = pin.computeFrameJacobian(model, data, q, tool, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        fastest = max(fastest, -float(reference.normal @ J[:3] @ v))
+        fastest = max(fastest, -float(reference.normal @ dynamics.target(*trajectory.at(t)).V[:3]))
     return fastest / speed
 
 

@@ -112,30 +112,23 @@ class Guard:
         """Begin anew: no excess has lasted yet."""
         self._forced = self._spent = self._struck = self._silent = 0.0
 
-    def force(self, force: np.ndarray) -> Stop | None:
-        """Look at the contact force (3,) in N."""
-        x, y, z = force.tolist()
-        size = math.sqrt(x * x + y * y + z * z)
-        self._forced = self._longer(self._forced, size > FORCE_ALERT * self._limits.contact_force)
-        return ForceTooHigh(size, self._limits.contact_force) if self._forced > FORCE_PATIENCE else None
-
-    def speed(self, V: np.ndarray) -> Stop | None:
-        """Look at the tool's velocity (6,)."""
-        x, y, z = V[:3].tolist()
-        speed = math.sqrt(x * x + y * y + z * z)
-        return TooFast(speed, self._limits.speed) if speed > ALERT * self._limits.speed else None
-
-    def sudden(self, torque: np.ndarray) -> Stop | None:
-        """Look at torques (7,) in Nm that nothing explains."""
-        worst, share = _worst(torque, self._limits.collision)
-        self._struck = self._longer(self._struck, share > 1.0)
-        return Collision(worst + 1, float(abs(torque[worst]))) if self._struck > COLLISION_PATIENCE else None
-
-    def torque(self, tau: np.ndarray) -> Stop | None:
-        """Look at torques (7,) in Nm that are commanded."""
-        worst, share = _worst(tau, self._tau_max)
-        self._spent = self._longer(self._spent, share > TORQUE_ALERT)
-        return TorqueSpent(worst + 1, float(self._tau_max[worst])) if self._spent > TORQUE_PATIENCE else None
+    def look(self, V: np.ndarray, wrench: np.ndarray, sudden: np.ndarray, tau: np.ndarray) -> Stop | None:
+        """Look at one tick: the tool's velocity (6,), the wrench (6,) in contact, torques (7,) in Nm that nothing
+        explains, and those (7,) that are commanded."""
+        limits = self._limits
+        speed, force, struck, blow, spent, effort = _sizes(V, wrench, sudden, limits.collision, tau, self._tau_max)
+        self._forced = self._longer(self._forced, force > FORCE_ALERT * limits.contact_force)
+        self._struck = self._longer(self._struck, blow > 1.0)
+        self._spent = self._longer(self._spent, effort > TORQUE_ALERT)
+        if speed > ALERT * limits.speed:
+            return TooFast(speed, limits.speed)
+        if self._forced > FORCE_PATIENCE:
+            return ForceTooHigh(force, limits.contact_force)
+        if self._struck > COLLISION_PATIENCE:
+            return Collision(struck + 1, float(abs(sudden[struck])))
+        if self._spent > TORQUE_PATIENCE:
+            return TorqueSpent(spent + 1, float(self._tau_max[spent]))
+        return None
 
     def sensor(self, is_silent: bool) -> Stop | None:
         """Look at whether the wrist sensor says anything, while a force is to be kept."""
@@ -144,6 +137,16 @@ class Guard:
 
     def _longer(self, so_far: float, is_so: bool) -> float:
         return so_far + self._period if is_so else 0.0
+
+
+@njit(cache=True)
+def _sizes(V, wrench, sudden, collision, tau, tau_max):
+    """Speed and force, and of both torques the joint that is worst and its share of the limit."""
+    speed = math.sqrt(V[0] ** 2 + V[1] ** 2 + V[2] ** 2)
+    force = math.sqrt(wrench[0] ** 2 + wrench[1] ** 2 + wrench[2] ** 2)
+    struck, blow = _worst(sudden, collision)
+    spent, effort = _worst(tau, tau_max)
+    return speed, force, struck, blow, spent, effort
 
 
 @njit(cache=True)

@@ -1,17 +1,12 @@
-"""The arm's dynamics at one instant, everything the tasks and limits need of the model."""
+"""The arm at one instant, everything the tasks and limits need of the model, and where its tool should be."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
-
-from sim.robot import RobotModel
-
-WORLD_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+from numba import njit
 
 
-@dataclass(frozen=True, slots=True)
-class ArmState:
+class ArmState(NamedTuple):
     """Model quantities at configuration q and velocity v (7,).
 
     M (7,7) joint inertia; bias (7,) Coriolis and gravity torques. At the tool centre G, in W axes:
@@ -33,9 +28,14 @@ class ArmState:
         """J M⁻¹ Jᵀ (6,6), the inverse of the task-space inertia Λ."""
         return self.J @ np.linalg.solve(self.M, self.J.T)
 
+    def torques_of(self, wrench: np.ndarray) -> np.ndarray:
+        """Jᵀ F: the joint torques (7,) in Nm of a wrench F (6,) on the tool, at G in W axes."""
+        tau = np.empty(7)
+        _fill_torques(self.J, wrench, tau)
+        return tau
 
-@dataclass(frozen=True, slots=True)
-class Target:
+
+class Target(NamedTuple):
     """A pose to follow: p (3,) and R (3,3) in W, velocity V (6,) and acceleration A (6,) in W axes."""
 
     p: np.ndarray
@@ -44,38 +44,9 @@ class Target:
     A: np.ndarray
 
 
-_AT_REST = np.zeros(7)
-
-
-def measure(robot: RobotModel, data: pin.Data, q: np.ndarray, v: np.ndarray) -> ArmState:
-    """Evaluate the model at q, v (7,). `data` is overwritten."""
-    model, tool = robot.model, robot.tcp_id
-    bias = pin.nonLinearEffects(model, data, q, v)
-    M = pin.crba(model, data, q)
-    J = np.ascontiguousarray(pin.computeFrameJacobian(model, data, q, tool, WORLD_AXES))
-    pin.forwardKinematics(model, data, q, v, _AT_REST)
-    pose = pin.updateFramePlacement(model, data, tool)
-    return ArmState(
-        q=q,
-        v=v,
-        M=M.copy(),
-        bias=bias.copy(),
-        J=J,
-        drift=pin.getFrameClassicalAcceleration(model, data, tool, WORLD_AXES).vector,
-        p=pose.translation.copy(),
-        R=pose.rotation.copy(),
-        V=J @ v,
-    )
-
-
-def target_at(robot: RobotModel, data: pin.Data, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> Target:
-    """The tool's motion when the joints are at q with velocity v and acceleration a (7,). `data` is overwritten."""
-    model, tool = robot.model, robot.tcp_id
-    pin.forwardKinematics(model, data, q, v, a)
-    pose = pin.updateFramePlacement(model, data, tool)
-    return Target(
-        p=pose.translation.copy(),
-        R=pose.rotation.copy(),
-        V=pin.getFrameVelocity(model, data, tool, WORLD_AXES).vector,
-        A=pin.getFrameClassicalAcceleration(model, data, tool, WORLD_AXES).vector,
-    )
+@njit(cache=True)
+def _fill_torques(J: np.ndarray, wrench: np.ndarray, tau: np.ndarray) -> None:
+    for i in range(len(tau)):
+        tau[i] = 0.0
+        for k in range(len(wrench)):
+            tau[i] += J[k, i] * wrench[k]

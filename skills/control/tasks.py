@@ -9,8 +9,7 @@ consistent projection of Khatib, 1987.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
@@ -30,8 +29,7 @@ LANDING_DAMPING = 50.0
 """The same at touchdown, against bouncing: later it would hold back the force."""
 
 
-@dataclass(frozen=True, slots=True)
-class Rows:
+class Rows(NamedTuple):
     """Cost weight · ‖A q̈ − b‖² with A (k,7) and b (k,)."""
 
     A: np.ndarray
@@ -45,8 +43,7 @@ class Task(Protocol):
     def rows(self, state: ArmState) -> Rows: ...
 
 
-@dataclass(frozen=True, slots=True)
-class JointTask:
+class JointTask(NamedTuple):
     """Follow q_d, v_d, a_d (7,) in joint space: q̈* = a_d + 80 (v_d − q̇) + 1600 (q_d − q).
 
     Stiff, because the last joint carries little inertia: there, what the grip on a held thing
@@ -60,11 +57,12 @@ class JointTask:
     stiffness: float = STIFF
 
     def rows(self, state: ArmState) -> Rows:
-        return Rows(_EYE, self.a + self.damping * (self.v - state.v) + self.stiffness * (self.q - state.q))
+        wanted = np.empty(7)
+        _joint_accelerations(self.q, self.v, self.a, self.damping, self.stiffness, state.q, state.v, wanted)
+        return Rows(_EYE, wanted)
 
 
-@dataclass(frozen=True, slots=True)
-class PostureTask:
+class PostureTask(NamedTuple):
     """Follow q, v, a (7,) with the one freedom that six task-space rows leave.
 
     The row is nᵀ M q̈ with J n = 0: orthogonal, in the metric of M, to whatever moves the tool, so
@@ -111,8 +109,7 @@ class PoseTask:
         return Rows(state.J, target.A + pull / root - state.drift)
 
 
-@dataclass(frozen=True, slots=True)
-class HybridTask:
+class HybridTask(NamedTuple):
     """Follow the target stiffly, except along the z axis of the contact frame C: there velocity is
     only damped, and a force (added by the caller as a feedforward torque) decides.
 
@@ -124,9 +121,8 @@ class HybridTask:
     sink_damping: float = SINK_DAMPING
 
     def rows(self, state: ArmState) -> Rows:
-        target, wanted = self.target, np.empty(6)
-        _fill_pose_error(target.p, target.R, state.p, state.R, wanted)
-        _hybrid_acceleration(wanted, target.V, target.A, state.V, state.drift, self.R_WC, self.sink_damping)
+        wanted, now = np.empty(6), (state.p, state.R, state.V, state.drift)
+        _hybrid_acceleration(*self.target, *now, self.R_WC, self.sink_damping, wanted)
         return Rows(state.J, wanted)
 
 
@@ -158,14 +154,15 @@ def _fill_pose_error(p_d: np.ndarray, R_d: np.ndarray, p: np.ndarray, R: np.ndar
         error[i] = p_d[i] - p[i]
         for j in range(3):
             Q[i, j] = R_d[i, 0] * R[j, 0] + R_d[i, 1] * R[j, 1] + R_d[i, 2] * R[j, 2]
-    # Unit quaternion of Q, from whichever of its components is large (Shepperd, 1978).
+    # Unit quaternion (u, w) of Q, from whichever of its components is large (Shepperd, 1978).
     trace = Q[0, 0] + Q[1, 1] + Q[2, 2]
-    u = np.empty(3)
+    u = error[3:]
     if trace > 0.0:
         root = math.sqrt(1.0 + trace)
         w = root / 2
         u[0], u[1], u[2] = Q[2, 1] - Q[1, 2], Q[0, 2] - Q[2, 0], Q[1, 0] - Q[0, 1]
-        u /= 2 * root
+        for i in range(3):
+            u[i] /= 2 * root
     else:
         i = 0
         if Q[1, 1] > Q[0, 0]:
@@ -177,25 +174,21 @@ def _fill_pose_error(p_d: np.ndarray, R_d: np.ndarray, p: np.ndarray, R: np.ndar
         u[i] = root / 2
         u[j], u[k] = (Q[i, j] + Q[j, i]) / (2 * root), (Q[i, k] + Q[k, i]) / (2 * root)
         w = (Q[k, j] - Q[j, k]) / (2 * root)
-    if w < 0.0:
-        w, u = -w, -u
     sine = math.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-    scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, w) / sine
+    scale = 2.0 if sine < 1e-9 else 2.0 * math.atan2(sine, abs(w)) / sine
     for i in range(3):
-        error[3 + i] = scale * u[i]
+        u[i] *= math.copysign(scale, w)
 
 
 @njit(cache=True)
-def _hybrid_acceleration(
-    wanted: np.ndarray,
-    V_d: np.ndarray,
-    A_d: np.ndarray,
-    V: np.ndarray,
-    drift: np.ndarray,
-    R_WC: np.ndarray,
-    sink_damping: float,
-) -> None:
-    """From the pose error (6,) in `wanted` to the rows' b."""
+def _joint_accelerations(q_d, v_d, a_d, damping, stiffness, q, v, wanted):
+    for i in range(len(q)):
+        wanted[i] = a_d[i] + damping * (v_d[i] - v[i]) + stiffness * (q_d[i] - q[i])
+
+
+@njit(cache=True)
+def _hybrid_acceleration(p_d, R_d, V_d, A_d, p, R, V, drift, R_WC, sink_damping, wanted):
+    _fill_pose_error(p_d, R_d, p, R, wanted)
     along = sinking = 0.0
     for i in range(6):
         wanted[i] = A_d[i] + DAMPED * (V_d[i] - V[i]) + STIFF * wanted[i]

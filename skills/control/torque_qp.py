@@ -7,14 +7,14 @@ with h the Coriolis and gravity torques and f a feedforward torque (minus Jᵀ t
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from sim.robot import RobotModel
-from skills.control.limits import FREE, AccelerationLimit, Bound, PositionLimit, Row, TorqueLimits, VelocityLimit
-from skills.control.osqp_ import SOLVED, Solver, Workspace
+from skills.control.limits import FREE, AccelerationLimit, Block, Bound, PositionLimit, Row, TorqueLimits, VelocityLimit
+from skills.control.osqp_ import SOLVED, Problem, Solver, Workspace
 from skills.control.state import ArmState
 from skills.control.tasks import Task
 
@@ -32,8 +32,7 @@ FALLBACK_DECAY = 0.8
 """Share of the last solution that is kept from one failed tick to the next."""
 
 
-@dataclass(frozen=True, slots=True)
-class Solution:
+class Solution(NamedTuple):
     """Torques tau (7,) Nm, the accelerations a (7,) rad/s² they are meant to give, and the solver's status."""
 
     tau: np.ndarray
@@ -70,7 +69,13 @@ class TorqueQP:
             PositionLimit(robot.q_min, robot.q_max, robot.a_max, period),
         )
         self._torque_limits = TorqueLimits(robot.tau_max)
-        self._rows = np.zeros((7 + SPARE_ROWS, 7)), np.empty(7 + SPARE_ROWS), np.empty(7 + SPARE_ROWS)
+        rows = 7 + SPARE_ROWS
+        self._problem = Problem(
+            np.empty((7, 7)), np.empty(7), np.empty((rows, 7)), np.empty(7 + rows), np.empty(7 + rows)
+        )
+        lower, upper = self._problem.lower, self._problem.upper
+        self._joint_bounds = lower[:7], upper[:7]
+        self._rows = Block(self._problem.R, lower[7:], upper[7:])
         self._last = np.zeros(7)
         self._last_feedforward = np.zeros(7)
         self._lap = lap
@@ -80,56 +85,76 @@ class TorqueQP:
     def solve(
         self, state: ArmState, tasks: Sequence[Task], feedforward: np.ndarray, limits: Sequence[Row] = ()
     ) -> Solution:
-        """Accelerations and torques for this instant; feedforward f (7,) in Nm, `limits` of SPARE_ROWS rows at most.
+        """Accelerations and torques for this instant; feedforward f (7,) in Nm.
 
         Whenever the solver ends with anything but "solved", the last solution fades, tick by tick,
         into braking under gravity compensation, clipped to the torque limits.
+
+        Raises ValueError for more than SPARE_ROWS `limits`.
         """
-        P, g = REGULARISATION * _EYE, np.zeros(7)
+        if len(limits) > SPARE_ROWS:
+            raise ValueError(f"{len(limits)} limits besides the torques', expected {SPARE_ROWS} at most")
+        problem = self._problem
+        _clear(*problem)
         for task in tasks:
-            rows = task.rows(state)
-            _add(rows.A, rows.b, rows.weight, P, g)
-        bounds = self.joint_bounds(state)
-        rows = self._all_rows(state, feedforward, limits)
+            A, b, weight = task.rows(state)
+            _add(A, b, weight, problem.P, problem.g)
+        for bound in self._bounds:
+            bound.narrow(state, *self._joint_bounds)
+        self._torque_limits.fill(state, feedforward, self._rows)
+        for row, limit in enumerate(limits, start=7):
+            limit.fill(state, self._rows, row)
         self._lap("QP build")
-        a, status = self._workspace.solve(P, g, bounds, rows)
+        a, status = self._workspace.solve(problem)
         self._lap("solve")
         if status != SOLVED:
-            return self._fall_back(state, bounds, status)
-        tau = state.M @ a + state.bias + feedforward
+            return self._fall_back(state, status)
+        tau = _torques(state, a, feedforward)
         if self._torque_limits.broken(tau):
             self.torque_limit_violations += 1
         self._last, self._last_feedforward = a, feedforward
         return Solution(tau, a, status)
 
-    def joint_bounds(self, state: ArmState) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds (7,) on q̈; lower never exceeds upper."""
-        lower, upper = _LOWEST.copy(), _HIGHEST.copy()
-        for bound in self._bounds:
-            bound.narrow(state, lower, upper)
-        return lower, upper
+    @property
+    def joint_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds (7,) on q̈ at the last tick; lower never exceeds upper."""
+        lower, upper = self._joint_bounds
+        return lower.copy(), upper.copy()
 
-    def _all_rows(
-        self, state: ArmState, feedforward: np.ndarray, limits: Sequence[Row]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        R, lower, upper = self._rows
-        lower[7:], upper[7:] = -FREE, FREE
-        filled = 0
-        for limit in (self._torque_limits, *limits):
-            rows, low, high = limit.rows(state, feedforward)
-            end = filled + len(rows)
-            R[filled:end], lower[filled:end], upper[filled:end] = rows, low, high
-            filled = end
-        R[filled:] = 0.0
-        return R, lower, upper
-
-    def _fall_back(self, state: ArmState, bounds: tuple[np.ndarray, np.ndarray], status: str) -> Solution:
+    def _fall_back(self, state: ArmState, status: str) -> Solution:
         self.fallbacks += 1
         braking = -FALLBACK_DAMPING * state.v
-        a = np.clip(FALLBACK_DECAY * self._last + (1.0 - FALLBACK_DECAY) * braking, bounds[0], bounds[1])
+        a = np.clip(FALLBACK_DECAY * self._last + (1.0 - FALLBACK_DECAY) * braking, *self._joint_bounds)
         self._last, self._last_feedforward = a, FALLBACK_DECAY * self._last_feedforward
-        tau = state.M @ a + state.bias + self._last_feedforward
+        tau = _torques(state, a, self._last_feedforward)
         return Solution(self._torque_limits.clip(tau), a, status)
+
+
+def _torques(state: ArmState, a: np.ndarray, feedforward: np.ndarray) -> np.ndarray:
+    """M a + h + f (7,)."""
+    tau = np.empty(7)
+    _fill_torques(state.M, a, state.bias, feedforward, tau)
+    return tau
+
+
+@njit(cache=True)
+def _fill_torques(M: np.ndarray, a: np.ndarray, bias: np.ndarray, feedforward: np.ndarray, tau: np.ndarray) -> None:
+    for i in range(len(tau)):
+        tau[i] = bias[i] + feedforward[i]
+        for j in range(len(tau)):
+            tau[i] += M[i, j] * a[j]
+
+
+@njit(cache=True)
+def _clear(P: np.ndarray, g: np.ndarray, R: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
+    """No tasks and no limits."""
+    P[:] = 0.0
+    for i in range(len(g)):
+        P[i, i] = REGULARISATION
+    g[:] = 0.0
+    R[:] = 0.0
+    lower[:] = -FREE
+    upper[:] = FREE
 
 
 @njit(cache=True)
@@ -141,7 +166,3 @@ def _add(A: np.ndarray, b: np.ndarray, weight: float, P: np.ndarray, g: np.ndarr
             g[i] -= share * b[k]
             for j in range(len(g)):
                 P[i, j] += share * A[k, j]
-
-
-_EYE = np.eye(7)
-_LOWEST, _HIGHEST = np.full(7, -FREE), np.full(7, FREE)

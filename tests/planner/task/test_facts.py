@@ -36,6 +36,14 @@ def test_the_facts_of_fig1_are_those_of_the_paper():
     }
 
 
+def test_what_was_merely_nudged_states_the_very_same_set():
+    scene, learned = SceneState.initial(load_scenario("fig1"), 0.1), Learned(CATALOGUE)
+    nudged = scene.moved("book", at(0.002, 0.0, 0.0) * scene.poses["book"])
+    assert facts(nudged, learned) is facts(scene, learned)
+    gone = scene.without(frozenset({"book"}))
+    assert facts(gone, learned) == {fact for fact in facts(scene, learned) if "book" not in fact.args}
+
+
 def test_what_is_too_small_to_grasp_is_a_crumb_and_a_tool_is_a_tool():
     kinds = objects_of(SceneState.initial(load_scenario("fig1"), 0.1))
     assert kinds == {

@@ -5,9 +5,9 @@ import pytest
 from sim.plant import GripCommand
 from sim.wrench import Wrench
 from skills.control.contact import ContactWrench, Touch, hand_inertia
+from skills.control.dynamics import Dynamics
 from skills.control.force import ForceLoop, smooth_step
 from skills.control.reference import Reference
-from skills.control.state import measure
 
 PERIOD = 0.002
 
@@ -46,8 +46,8 @@ def test_weight_and_inertia_of_hand_and_load_are_taken_off(robot):
         q, v, a = rng.uniform(-1.0, 1.0, (3, 7))
         contact = ContactWrench(robot, PERIOD)
         contact.carry(load)
-        contact.update(measure(robot, robot.data(), q, v - a * PERIOD), Wrench.zero())
-        contact.update(measure(robot, robot.data(), q, v), sensed(robot, q, v, a, load, push))
+        contact.update(Dynamics(robot).state(q, v - a * PERIOD), Wrench.zero())
+        contact.update(Dynamics(robot).state(q, v), sensed(robot, q, v, a, load, push))
         np.testing.assert_allclose(contact.raw, push, atol=1e-9)
 
 
@@ -60,7 +60,7 @@ def test_taring_takes_off_an_error_of_the_sensor_wherever_the_hand_turns(robot):
         return Wrench(true.force + offset.force, true.torque + offset.torque)
 
     def at(q):
-        return measure(robot, robot.data(), q, still)
+        return Dynamics(robot).state(q, still)
 
     contact = ContactWrench(robot, PERIOD)
     for _ in range(200):

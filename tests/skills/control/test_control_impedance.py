@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from planner.motion.trajectory import Trajectory
+from skills.control.dynamics import Dynamics
 from skills.control.reference import Reference
-from skills.control.state import Target, measure
+from skills.control.state import Target
 from skills.control.tasks import pose_error
 
 PUSH = 10.0
@@ -23,7 +24,7 @@ def test_10_newtons_displace_the_tool_by_force_over_stiffness_and_it_returns_cri
     rig = lab.rig(q0)
     rig.controller.follow(Reference(Trajectory.standstill(q0), "impedance", lab.stiffness))
     rig.run(0.1)
-    rest = measure(lab.robot, lab.robot.data(), rig.q, np.zeros(7))
+    rest = Dynamics(lab.robot).state(rig.q, np.zeros(7))
     home = Target(rest.p, rest.R, np.zeros(6), np.zeros(6))
 
     direction = np.array([0.6, 0.6, np.sqrt(0.28)])
@@ -37,8 +38,8 @@ def test_10_newtons_displace_the_tool_by_force_over_stiffness_and_it_returns_cri
     rig.push = None
     root = np.sqrt(lab.stiffness)
     squares, modes = np.linalg.eigh(root[:, None] * rest.mobility * root)
-    data = lab.robot.data()
-    response = rig.run(0.4, lambda o: modes.T @ (root * pose_error(home, measure(lab.robot, data, o.q, o.v))))
+    dynamics = Dynamics(lab.robot)
+    response = rig.run(0.4, lambda o: modes.T @ (root * pose_error(home, dynamics.state(o.q, o.v))))
     response = np.array(response)[1:]
     frequencies = np.sqrt(squares)
     for mode in range(6):

@@ -4,9 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.motion.trajectory import Trajectory
+from skills.control.dynamics import Dynamics
 from skills.control.limits import FREE, AccelerationLimit, PositionLimit, VelocityLimit
 from skills.control.reference import Reference
-from skills.control.state import measure
 from skills.control.tasks import JointTask
 from skills.control.torque_qp import TorqueQP
 
@@ -92,13 +92,13 @@ def test_a_joint_found_beyond_its_limit_is_led_back(robot, limits):
 
 
 def test_the_qp_stops_a_joint_that_is_sent_through_its_limit(robot):
-    q, v, data = np.zeros(7), np.zeros(7), robot.data()
+    q, v, dynamics = np.zeros(7), np.zeros(7), Dynamics(robot)
     q[3] = -1.0
     qp = TorqueQP(robot, PERIOD)
     goal = q.copy()
     goal[3] = robot.q_min[3] - 0.5
     for _ in range(1200):
-        solution = qp.solve(measure(robot, data, q, v), [JointTask(goal, np.zeros(7), np.zeros(7))], np.zeros(7))
+        solution = qp.solve(dynamics.state(q, v), [JointTask(goal, np.zeros(7), np.zeros(7))], np.zeros(7))
         q, v = q + v * PERIOD + solution.a * PERIOD**2 / 2, v + solution.a * PERIOD
     assert robot.q_min[3] - 1e-4 < q[3] < robot.q_min[3] + 0.01
     assert qp.fallbacks == 0

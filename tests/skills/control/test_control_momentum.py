@@ -5,9 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.motion.trajectory import Trajectory
+from skills.control.dynamics import Dynamics
 from skills.control.momentum import GAIN, MomentumObserver
 from skills.control.reference import Reference
-from skills.control.state import measure
 
 PERIOD = 0.002
 FRICTION = np.full(7, 1.0)
@@ -15,11 +15,11 @@ FRICTION = np.full(7, 1.0)
 
 def observed(robot, outside, sensed, duration=0.3):
     """What an observer makes of a simulated free motion under `outside` (7,), of which the sensor tells `sensed`."""
-    observer, data = MomentumObserver(PERIOD), robot.data()
+    observer, dynamics, data = MomentumObserver(PERIOD), Dynamics(robot), robot.data()
     q, v = np.full(7, 0.3), np.zeros(7)
     tau, seen = np.zeros(7), []
     for _ in range(round(duration / PERIOD)):
-        state = measure(robot, data, q, v)
+        state = dynamics.state(q, v)
         observer.update(state.M, state.bias, v, tau, sensed)
         seen.append(observer.unmodelled)
         tau = state.bias + np.zeros(7)

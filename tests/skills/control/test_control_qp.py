@@ -4,10 +4,12 @@ import qpsolvers
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skills.control.osqp_ import Workspace
-from skills.control.state import Target, measure
+from skills.control.dynamics import Dynamics
+from skills.control.limits import ApproachLimit
+from skills.control.osqp_ import Problem, Workspace
+from skills.control.state import Target
 from skills.control.tasks import HybridTask, JointTask, PostureTask
-from skills.control.torque_qp import FALLBACK_DAMPING, TorqueQP
+from skills.control.torque_qp import FALLBACK_DAMPING, SPARE_ROWS, TorqueQP
 
 PERIOD = 0.002
 NOTHING = np.zeros(7)
@@ -19,17 +21,12 @@ def random_problem(seed):
     root = rng.normal(size=(7, 7))
     R = rng.normal(size=(7, 7))
     width = rng.uniform(0.1, 3.0, 14)
-    return (
-        root @ root.T + 0.1 * np.eye(7),
-        5.0 * rng.normal(size=7),
-        (-width[:7], width[:7]),
-        (R, -width[7:], width[7:]),
-    )
+    return Problem(root @ root.T + 0.1 * np.eye(7), 5.0 * rng.normal(size=7), R, -width, width)
 
 
 def random_state(robot, rng):
     q = robot.q_min + (robot.q_max - robot.q_min) * rng.uniform(0.05, 0.95, 7)
-    return measure(robot, robot.data(), q, robot.v_max * rng.uniform(-0.9, 0.9, 7))
+    return Dynamics(robot).state(q, robot.v_max * rng.uniform(-0.9, 0.9, 7))
 
 
 @pytest.fixture(scope="module")
@@ -40,10 +37,10 @@ def workspace():
 @settings(max_examples=60, derandomize=True, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_the_optimum_is_that_of_another_solver(workspace, seed):
-    P, g, (lower, upper), (R, row_lower, row_upper) = random_problem(seed)
-    x, status = workspace.solve(P, g, (lower, upper), (R, row_lower, row_upper))
-    G, h = np.vstack([R, -R]), np.concatenate([row_upper, -row_lower])
-    reference = qpsolvers.solve_qp(P, g, G=G, h=h, lb=lower, ub=upper, solver="daqp")
+    P, g, R, lower, upper = problem = random_problem(seed)
+    x, status = workspace.solve(problem)
+    G, h = np.vstack([R, -R]), np.concatenate([upper[7:], -lower[7:]])
+    reference = qpsolvers.solve_qp(P, g, G=G, h=h, lb=lower[:7], ub=upper[:7], solver="daqp")
     assert status == "solved"
     np.testing.assert_allclose(x, reference, atol=1e-4)
 
@@ -51,35 +48,32 @@ def test_the_optimum_is_that_of_another_solver(workspace, seed):
 def test_the_persistent_workspace_answers_like_a_fresh_one(workspace):
     for seed in range(20):
         problem = random_problem(seed)
-        np.testing.assert_allclose(workspace.solve(*problem)[0], Workspace(7, 7).solve(*problem)[0], atol=1e-5)
+        np.testing.assert_allclose(workspace.solve(problem)[0], Workspace(7, 7).solve(problem)[0], atol=1e-5)
 
 
 def test_bounds_that_cross_are_infeasible_instead_of_silently_ignored(workspace):
-    P, g, (lower, upper), rows = random_problem(0)
-    lower = lower.copy()
-    lower[3] = upper[3] + 1.0
-    assert workspace.solve(P, g, (lower, upper), rows)[1] == "primal infeasible"
+    problem = random_problem(0)
+    problem.lower[3] = problem.upper[3] + 1.0
+    assert workspace.solve(problem)[1] == "primal infeasible"
 
 
 def test_a_problem_with_no_feasible_point_is_reported_and_forgotten(workspace):
-    P, g, (lower, upper), _ = random_problem(0)
-    far = np.full(7, 100.0)
-    assert workspace.solve(P, g, (lower, upper), (np.eye(7), far, far))[1] == "primal infeasible"
-    assert workspace.solve(*random_problem(1))[1] == "solved"
+    problem = random_problem(0)._replace(R=np.eye(7))
+    problem.lower[7:] = problem.upper[7:] = 100.0
+    assert workspace.solve(problem)[1] == "primal infeasible"
+    assert workspace.solve(random_problem(1))[1] == "solved"
 
 
-@pytest.mark.parametrize("part", ["P", "g", "R", "bound"])
+@pytest.mark.parametrize("part", ["P", "g", "R", "lower"])
 def test_a_number_that_is_not_finite_is_reported_and_forgotten(workspace, part):
-    P, g, (lower, upper), (R, row_lower, row_upper) = random_problem(0)
-    g, lower = g.copy(), lower.copy()
-    {"P": P, "g": g, "R": R, "bound": lower}[part].flat[2] = np.nan
-    assert workspace.solve(P, g, (lower, upper), (R, row_lower, row_upper))[1] == "problem not finite"
-    assert workspace.solve(*random_problem(1))[1] == "solved"
+    problem = random_problem(0)
+    getattr(problem, part).flat[2] = np.nan
+    assert workspace.solve(problem)[1] == "problem not finite"
+    assert workspace.solve(random_problem(1))[1] == "solved"
 
 
 def test_too_few_iterations_are_reported():
-    P, g, bounds, rows = random_problem(3)
-    assert Workspace(7, 7, max_iter=1).solve(P, g, bounds, rows)[1] == "maximum iterations reached"
+    assert Workspace(7, 7, max_iter=1).solve(random_problem(3))[1] == "maximum iterations reached"
 
 
 @settings(max_examples=60, derandomize=True, deadline=None)
@@ -95,19 +89,29 @@ def test_torques_and_accelerations_keep_their_limits_whatever_is_asked(robot, se
     ][seed % 2]
     qp = TorqueQP(robot, PERIOD)
     solution = qp.solve(state, tasks, state.J.T @ (10.0 * rng.normal(size=6)))
-    lower, upper = qp.joint_bounds(state)
+    lower, upper = qp.joint_bounds
     assert np.all(np.abs(solution.tau) <= robot.tau_max)
     assert solution.is_fallback or np.all((solution.a >= lower - 1e-2) & (solution.a <= upper + 1e-2))
     assert qp.torque_limit_violations == 0
 
 
 def test_tasks_are_met_exactly_while_no_limit_is_near(robot):
-    state = measure(robot, robot.data(), np.radians([10.0, 30.0, 5.0, -80.0, 0.0, 60.0, 20.0]), NOTHING)
+    state = Dynamics(robot).state(np.radians([10.0, 30.0, 5.0, -80.0, 0.0, 60.0, 20.0]), NOTHING)
     target = Target(state.p, state.R, np.zeros(6), np.array([0.5, -1.0, 0.0, 2.0, 1.0, -1.0]))
     solution = TorqueQP(robot, PERIOD).solve(
         state, [HybridTask(target, np.eye(3)), PostureTask(state.q, NOTHING, NOTHING)], NOTHING
     )
     np.testing.assert_allclose(state.J @ solution.a, target.A, atol=1e-3)
+
+
+def test_more_limits_than_there_are_rows_for_are_refused(robot):
+    state = random_state(robot, np.random.default_rng(7))
+    limit = ApproachLimit(np.array([0.0, 0.0, 1.0]), 0.05)
+    qp = TorqueQP(robot, PERIOD)
+    task = [JointTask(state.q, NOTHING, NOTHING)]
+    assert qp.solve(state, task, NOTHING, [limit] * SPARE_ROWS).status == "solved"
+    with pytest.raises(ValueError, match="3 limits besides the torques', expected 2 at most"):
+        qp.solve(state, task, NOTHING, [limit] * (SPARE_ROWS + 1))
 
 
 class FixedAnswer:
@@ -154,7 +158,7 @@ def test_every_status_but_solved_fades_into_braking_within_the_limits(robot, sta
     assert all(s.is_fallback and np.all(np.abs(s.tau) <= robot.tau_max) for s in solutions)
     assert qp.fallbacks == 60
     assert np.linalg.norm(solutions[0].a - before.a) < np.linalg.norm(solutions[-1].a - before.a)
-    lower, upper = qp.joint_bounds(state)
+    lower, upper = qp.joint_bounds
     np.testing.assert_allclose(solutions[-1].a, np.clip(-FALLBACK_DAMPING * state.v, lower, upper), atol=1e-3)
 
 

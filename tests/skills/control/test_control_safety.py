@@ -8,7 +8,8 @@ from sim.disturbance import DisturbedPlant
 from sim.plant import Command
 from sim.sensor_faults import ForceDelay, ForceFrozen, ForceMissing, ForceNoise
 from skills.control.controller import ArmController
-from skills.control.limits import FREE, ApproachLimit
+from skills.control.dynamics import Dynamics
+from skills.control.limits import FREE, ApproachLimit, Block
 from skills.control.reference import Reference
 from skills.control.safety import (
     Collision,
@@ -19,13 +20,13 @@ from skills.control.safety import (
     TooFast,
     TorqueSpent,
 )
-from skills.control.state import Target, measure
+from skills.control.state import Target
 from skills.control.tasks import HybridTask
 from skills.control.torque_qp import TorqueQP
 
 PERIOD = 0.002
 STILL = np.zeros(7)
-ALLOWED = np.array([0.0, -40.0, 0.0])
+ALLOWED = np.array([0.0, -40.0, 0.0, 0.0, 0.0, 0.0])
 
 
 def strict(rig, **limits):
@@ -36,7 +37,7 @@ def strict(rig, **limits):
 
 
 def test_the_approach_is_limited_and_the_arm_does_not_stop_for_it(robot):
-    state = measure(robot, robot.data(), np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 80.0, 0.0]), STILL)
+    state = Dynamics(robot).state(np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 80.0, 0.0]), STILL)
     dive = Target(state.p - [0.0, 0.0, 0.5], state.R, np.zeros(6), np.zeros(6))
     sideways = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     limit = ApproachLimit(np.array([0.0, 0.0, 1.0]), 0.05)
@@ -48,9 +49,12 @@ def test_the_approach_is_limited_and_the_arm_does_not_stop_for_it(robot):
 
 
 def test_away_from_the_surface_nothing_is_limited(robot):
-    state = measure(robot, robot.data(), np.full(7, 0.3), STILL)
-    _, _, high = ApproachLimit(np.array([0.0, 0.0, 1.0]), 0.05).rows(state, STILL)
-    assert high[0] == FREE
+    state = Dynamics(robot).state(np.full(7, 0.3), STILL)
+    block = Block(np.zeros((3, 7)), np.zeros(3), np.zeros(3))
+    ApproachLimit(np.array([0.0, 0.0, 1.0]), 0.05).fill(state, block, 1)
+    np.testing.assert_array_equal(block.upper, [0.0, FREE, 0.0])
+    np.testing.assert_allclose(block.R[1], state.J[2])
+    assert not block.R[[0, 2]].any()
 
 
 def test_a_tool_that_loses_the_table_sinks_no_faster_than_allowed(lab):
@@ -210,13 +214,20 @@ def test_in_free_motion_a_silent_sensor_changes_nothing(lab):
 
 def test_one_odd_reading_stops_nothing():
     guard = Guard(SafetyLimits(contact_force=60.0), np.full(7, 100.0), PERIOD)
-    assert [guard.force(force) for force in (ALLOWED, 3 * ALLOWED, 3 * ALLOWED, ALLOWED)] == [None] * 4
-    assert [guard.force(3 * ALLOWED) for _ in range(3)][-1] == ForceTooHigh(120.0, 60.0)
+
+    def pushed(wrench):
+        return guard.look(np.zeros(6), wrench, STILL, STILL)
+
+    def struck(torque):
+        return guard.look(np.zeros(6), np.zeros(6), torque, STILL)
+
+    assert [pushed(wrench) for wrench in (ALLOWED, 3 * ALLOWED, 3 * ALLOWED, ALLOWED)] == [None] * 4
+    assert [pushed(3 * ALLOWED) for _ in range(3)][-1] == ForceTooHigh(120.0, 60.0)
     hit = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 9.0])
-    assert [guard.sudden(hit) for _ in range(3)] == [None] * 3
-    assert guard.sudden(hit) == Collision(7, 9.0)
+    assert [struck(hit) for _ in range(3)] == [None] * 3
+    assert struck(hit) == Collision(7, 9.0)
     guard.reset()
-    assert guard.sudden(hit) is None
+    assert struck(hit) is None
 
 
 def test_a_tare_under_noise_and_delay_leaves_a_tenth_of_a_newton(lab):

@@ -1,11 +1,10 @@
-from dataclasses import replace
-
 import numpy as np
 import pinocchio as pin
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skills.control.state import Target, measure, target_at
+from skills.control.dynamics import Dynamics
+from skills.control.state import Target
 from skills.control.tasks import PoseTask, PostureTask, null_direction, pose_error
 
 STILL = np.zeros(7)
@@ -13,7 +12,7 @@ angles = st.lists(st.floats(-1.5, 1.5), min_size=7, max_size=7).map(np.array)
 
 
 def state_at(robot, q, v=STILL):
-    return measure(robot, robot.data(), q, v)
+    return Dynamics(robot).state(q, v)
 
 
 @settings(max_examples=50, derandomize=True, deadline=None)
@@ -63,7 +62,7 @@ def test_every_mode_of_the_sampled_impedance_is_critically_damped(lab, bend):
     target = Target(state.p, state.R, np.zeros(6), np.zeros(6))
 
     def answer(**moved):
-        return PoseTask(target, lab.stiffness, period).rows(replace(state, drift=np.zeros(6), **moved)).b
+        return PoseTask(target, lab.stiffness, period).rows(state._replace(drift=np.zeros(6), **moved)).b
 
     small, eye = 1e-6, np.eye(6)
     shifts = [answer(p=state.p + small * e) / small for e in np.eye(3)]
@@ -84,7 +83,7 @@ def test_a_damping_ratio_scales_what_answers_velocity_and_nothing_else(lab):
     target = Target(state.p + 0.01, state.R, np.zeros(6), np.zeros(6))
 
     def answer(ratio, V):
-        return PoseTask(target, lab.stiffness, 0.002, ratio).rows(replace(state, V=np.full(6, V))).b
+        return PoseTask(target, lab.stiffness, 0.002, ratio).rows(state._replace(V=np.full(6, V))).b
 
     still = answer(1.0, 0.0)
     np.testing.assert_allclose(answer(2.0, 0.0), still)
@@ -94,9 +93,9 @@ def test_a_damping_ratio_scales_what_answers_velocity_and_nothing_else(lab):
 def test_the_target_moves_as_the_joints_make_it_move(robot):
     rng = np.random.default_rng(2)
     q, v, a = rng.uniform(-1.0, 1.0, (3, 7))
-    data, h = robot.data(), 1e-5
-    now = target_at(robot, data, q, v, a)
-    soon = target_at(robot, data, q + h * v + h * h / 2 * a, v + h * a, a)
+    dynamics, h = Dynamics(robot), 1e-5
+    now = dynamics.target(q, v, a)
+    soon = dynamics.target(q + h * v + h * h / 2 * a, v + h * a, a)
     np.testing.assert_allclose((soon.p - now.p) / h, now.V[:3], atol=1e-4)
     np.testing.assert_allclose(pin.log3(soon.R @ now.R.T) / h, now.V[3:], atol=1e-4)
     np.testing.assert_allclose((soon.V - now.V) / h, now.A, atol=1e-3)
