@@ -300,7 +300,7 @@ class ArmController:
             return
         guard, reference = self._guard, self._reference
         tau = _NO_TORQUE if self._tau is None else self._tau
-        reason = guard.look(state.V, self._wrench.raw, self._observer.sudden, tau)
+        reason = guard.look(state.V, self._wrench.raw, self._observer.sudden, tau, self._pressed)
         if reason is None and reference is not None and reference.force > 0.0:
             reason = guard.sensor(self._wrench.is_silent)
         if reason is not None:

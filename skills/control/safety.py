@@ -13,8 +13,8 @@ from numba import njit
 ALERT = 0.9
 """Share of a safety limit at which the arm stops, so that the limit itself is not passed."""
 
-FORCE_ALERT = 0.75
-"""The same of the contact force: what is hit goes on pressing while the arm comes to rest."""
+BLOW_ALERT = 0.75
+"""The same of a contact force that isn't regulated: what is hit goes on pressing while the arm comes to rest."""
 
 TORQUE_ALERT = 0.98
 """The same of a joint's torque: the QP keeps it within its limit anyway."""
@@ -112,12 +112,14 @@ class Guard:
         """Begin anew: no excess has lasted yet."""
         self._forced = self._spent = self._struck = self._silent = 0.0
 
-    def look(self, V: np.ndarray, wrench: np.ndarray, sudden: np.ndarray, tau: np.ndarray) -> Stop | None:
+    def look(
+        self, V: np.ndarray, wrench: np.ndarray, sudden: np.ndarray, tau: np.ndarray, is_pressed: bool
+    ) -> Stop | None:
         """Look at one tick: the tool's velocity (6,), the wrench (6,) in contact, torques (7,) in Nm that nothing
-        explains, and those (7,) that are commanded."""
+        explains, those (7,) that are commanded, and whether the tool is meant to press."""
         limits = self._limits
         speed, force, struck, blow, spent, effort = _sizes(V, wrench, sudden, limits.collision, tau, self._tau_max)
-        self._forced = self._longer(self._forced, force > FORCE_ALERT * limits.contact_force)
+        self._forced = self._longer(self._forced, force > (ALERT if is_pressed else BLOW_ALERT) * limits.contact_force)
         self._struck = self._longer(self._struck, blow > 1.0)
         self._spent = self._longer(self._spent, effort > TORQUE_ALERT)
         if speed > ALERT * limits.speed:

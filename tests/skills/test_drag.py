@@ -188,7 +188,7 @@ def test_a_book_that_slips_is_pressed_harder_on_the_way_and_still_comes_to_where
 
 
 def test_where_the_first_force_fails_a_greater_one_works_and_is_kept_for_the_next_drag():
-    true, believed = rough(1.0, 0.8)
+    true, believed = rough(1.0, 0.75)
     bench = Bench(true)
     bench.believe(believed)
     planner = build_planner(believed, RunOptions(), bench.robot, lambda kind, **data: None).planner

@@ -216,10 +216,10 @@ def test_one_odd_reading_stops_nothing():
     guard = Guard(SafetyLimits(contact_force=60.0), np.full(7, 100.0), PERIOD)
 
     def pushed(wrench):
-        return guard.look(np.zeros(6), wrench, STILL, STILL)
+        return guard.look(np.zeros(6), wrench, STILL, STILL, False)
 
     def struck(torque):
-        return guard.look(np.zeros(6), np.zeros(6), torque, STILL)
+        return guard.look(np.zeros(6), np.zeros(6), torque, STILL, False)
 
     assert [pushed(wrench) for wrench in (ALLOWED, 3 * ALLOWED, 3 * ALLOWED, ALLOWED)] == [None] * 4
     assert [pushed(3 * ALLOWED) for _ in range(3)][-1] == ForceTooHigh(120.0, 60.0)
@@ -228,6 +228,13 @@ def test_one_odd_reading_stops_nothing():
     assert struck(hit) == Collision(7, 9.0)
     guard.reset()
     assert struck(hit) is None
+
+
+@pytest.mark.parametrize(("force", "is_pressed", "is_stop"), [(50, False, True), (50, True, False), (56, True, True)])
+def test_a_force_that_is_regulated_may_come_nearer_to_the_limit_than_a_blow(force, is_pressed, is_stop):
+    guard, wrench = Guard(SafetyLimits(), np.full(7, 100.0), PERIOD), np.array([0.0, 0.0, force, 0.0, 0.0, 0.0])
+    stops = [guard.look(np.zeros(6), wrench, STILL, STILL, is_pressed) for _ in range(3)]
+    assert (stops[-1] is not None) == is_stop
 
 
 def test_a_tare_under_noise_and_delay_leaves_a_tenth_of_a_newton(lab):
