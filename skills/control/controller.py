@@ -96,7 +96,7 @@ class ArmController:
         self._course = Course(Trajectory.standstill(np.zeros(7)))
         self._state: ArmState | None = None
         self._tau: np.ndarray | None = None
-        self._pressed = False
+        self._pressed = self._presses = False
         self._anchor = 0.0
         self._without_contact = 0.0
         self._slowed = 1.0
@@ -300,7 +300,9 @@ class ArmController:
             return
         guard, reference = self._guard, self._reference
         tau = _NO_TORQUE if self._tau is None else self._tau
-        reason = guard.look(state.V, self._wrench.raw, self._observer.sudden, tau, self._pressed)
+        # What is pressed on is still there for a moment when it need no longer be pressed.
+        self._presses = self._pressed or (self._presses and self.contact)
+        reason = guard.look(state.V, self._wrench.raw, self._observer.sudden, tau, self._presses)
         if reason is None and reference is not None and reference.force > 0.0:
             reason = guard.sensor(self._wrench.is_silent)
         if reason is not None:
