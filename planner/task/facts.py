@@ -45,8 +45,8 @@ def place_of(scene: SceneState, name: str) -> str | None:
     """Where a body lies: a region's name, "table", or None (in the hand, on the floor, in the air).
 
     In a region: the centre inside its walls and below its rim. On the table: the centre above the
-    plate and the lowest point near its top, or on top of something there (but for crumbs: only what lies
-    on the table itself can be wiped).
+    plate and the lowest point near its top. Or on top of something on the table or in a dustpan (but for
+    crumbs: only what lies on the table itself can be wiped).
     """
     return _place_of(scene, name, layout(scene.scenario))
 
@@ -55,11 +55,14 @@ def _place_of(scene: SceneState, name: str, fixed: Layout) -> str | None:
     if (scene.held is not None and scene.held.name == name) or name not in scene.poses:
         return None
     place = fixed.place_of(name, scene.poses[name])
-    if place is not None or fixed.kinds[name] == "crumb" or not fixed.is_over_table(scene.poses[name]):
+    if place is not None or fixed.kinds[name] == "crumb":
         return place
-    beneath = supports(scene, name)
-    stands = any(other in scene.scenario.fixtures or _place_of(scene, other, fixed) == TABLE for other in beneath)
-    return TABLE if stands else None
+    over = fixed.over(scene.poses[name])
+    if over is None:
+        return None
+    fixtures = scene.scenario.fixtures if over == TABLE else ()
+    stands = any(other in fixtures or _place_of(scene, other, fixed) == over for other in supports(scene, name))
+    return over if stands else None
 
 
 def observed_facts(scene: SceneState) -> frozenset[Fact]:

@@ -31,6 +31,11 @@ class Span:
         x, y, z = self.axis
         return self.low <= x * p[0] + y * p[1] + z * p[2] <= self.high
 
+    def is_below(self, p: tuple[float, float, float]) -> bool:
+        """Does the point (3,) of W lie beyond the higher plane?"""
+        x, y, z = self.axis
+        return x * p[0] + y * p[1] + z * p[2] > self.high
+
 
 class Layout:
     """A scenario's regions and table as spans, and the PDDL type of each of its bodies and surfaces."""
@@ -42,16 +47,20 @@ class Layout:
         self.bins = frozenset(name for name, kind in self.surfaces.items() if kind == "bin")
         self._shapes = {name: body.shape for name, body in scenario.bodies.items()}
         self._regions = []
+        self._open: list[tuple[str, Span, Span, Span]] = []
         # Asked at every tick of the tree; most of what lies there has not moved since the last one.
         self._last: dict[str, tuple[SE3, str | None]] = {}
         for name, region in scenario.regions.items():
             lower, upper = interior(region)
             spans = _spans(region.X_WR, lower - [0.0, 0.0, REST_BELOW], upper)
             self._regions.append((name, spans))
+            if region.kind == "dustpan":
+                self._open.append((name, *spans))
         table = scenario.table
         half = np.array(table.size) / 2
         *self._plate, top = _spans(table.X_WT, -half, half)
         self._up, self._top = np.array(top.axis), top.high
+        self._open.append((TABLE, *self._plate, top))
 
     def place_of(self, name: str, X_WO: SE3) -> str | None:
         """The region in which a body's centre lies, or the table on which it rests, or None."""
@@ -73,10 +82,15 @@ class Layout:
                 return TABLE
         return None
 
-    def is_over_table(self, X_WO: SE3) -> bool:
-        """Does a body's centre lie above the table's plate, at whatever height?"""
+    def over(self, X_WO: SE3) -> str | None:
+        """The table or dustpan above which a body's centre lies, at whatever height. In a bin, what is heaped above
+        the rim isn't in it."""
         x, y, z = X_WO.translation.tolist()
-        return all(side.holds((x, y, z)) for side in self._plate) and float(self._up @ X_WO.translation) > self._top
+        p_W = (x, y, z)
+        for name, *sides, top in self._open:
+            if all(side.holds(p_W) for side in sides) and top.is_below(p_W):
+                return name
+        return None
 
 
 def layout(scenario: Scenario) -> Layout:

@@ -138,3 +138,10 @@ def test_what_stands_on_something_on_the_table_is_on_the_table(tabletop):
 def test_a_crumb_on_top_of_something_is_not_on_the_table_where_it_could_be_wiped(tabletop):
     scene = tabletop("cup", "crumb").moved("cup", at(0, 0, 0.03)).moved("crumb", at(0, 0, 0.07))
     assert place_of(scene, "crumb") is None
+
+
+def test_what_stands_above_the_dustpan_s_rim_on_something_in_it_can_be_taken_from_there(tabletop):
+    scene = tabletop("cup mug").moved("mug", at(0.75, 0, -0.03)).moved("cup", at(0.75, 0, 0.03))
+    assert place_of(scene, "cup") == "dustpan"
+    assert place_of(scene.moved("cup", at(0.75, 0.15, 0.03)), "cup") is None
+    assert place_of(scene.moved("mug", at(0, 1.0, -0.03)).moved("cup", at(0, 1.0, 0.03)), "cup") is None
