@@ -47,7 +47,7 @@ class Layout:
         self.bins = frozenset(name for name, kind in self.surfaces.items() if kind == "bin")
         self._shapes = {name: body.shape for name, body in scenario.bodies.items()}
         self._regions = []
-        self._open: list[tuple[str, Span, Span, Span]] = []
+        self._open: list[tuple[str, tuple[Span, ...]]] = []
         # Asked at every tick of the tree; most of what lies there has not moved since the last one.
         self._last: dict[str, tuple[SE3, str | None]] = {}
         for name, region in scenario.regions.items():
@@ -55,12 +55,12 @@ class Layout:
             spans = _spans(region.X_WR, lower - [0.0, 0.0, REST_BELOW], upper)
             self._regions.append((name, spans))
             if region.kind == "dustpan":
-                self._open.append((name, *spans))
+                self._open.append((name, spans))
         table = scenario.table
         half = np.array(table.size) / 2
         *self._plate, top = _spans(table.X_WT, -half, half)
         self._up, self._top = np.array(top.axis), top.high
-        self._open.append((TABLE, *self._plate, top))
+        self._open.append((TABLE, (*self._plate, top)))
 
     def place_of(self, name: str, X_WO: SE3) -> str | None:
         """The region in which a body's centre lies, or the table on which it rests, or None."""
@@ -87,7 +87,7 @@ class Layout:
         the rim isn't in it."""
         x, y, z = X_WO.translation.tolist()
         p_W = (x, y, z)
-        for name, *sides, top in self._open:
+        for name, (*sides, top) in self._open:
             if all(side.holds(p_W) for side in sides) and top.is_below(p_W):
                 return name
         return None

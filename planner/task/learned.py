@@ -65,6 +65,12 @@ class Case:
         """The minimal sets over all samples; empty when no sample is worth another try."""
         return minimal(kept.needs for kept in self.samples.values() if kept.needs)
 
+    def ways_out(self, own: Spot) -> Options:
+        """Any one of these sets has to leave its spots: the minimal sets, or else what the hand holds has to be held
+        otherwise. own: the spot of the action's object."""
+        held = {spot for kept in self.samples.values() for spot in kept.context if spot.left_by is None}
+        return self.minimal() or frozenset(frozenset({spot}) for spot in held - {own})
+
     def forget(self, is_gone: Callable[[Spot], bool]) -> None:
         """Take such spots out of what the samples need.
 
@@ -186,7 +192,7 @@ class Learned:
         found: dict[GroundAction, Options] = {}
         for (action, own), case in self._cases.items():
             if case.has_failed and not self._is_grasp_fact(action, own):
-                options = minimal({*case.minimal(), frozenset({own})}) if not case.is_proof else {frozenset({own})}
+                options = minimal({*case.ways_out(own), frozenset({own})}) if not case.is_proof else {frozenset({own})}
                 known = found.get(action, frozenset({frozenset()}))
                 found[action] = minimal(first | second for first in known for second in options)
         return {**found, **dict.fromkeys(self._never, frozenset())}

@@ -1,8 +1,10 @@
 """The loop between task planner and refinement, with a stand-in for the skills and the real Pyperplan."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from pinocchio import SE3
 
@@ -17,7 +19,7 @@ from planner.task.sexpr import PddlError
 from planner.task.situation import Spot
 from planner.task.symbols import Fact, GroundAction
 from scenarios.load import load_scenario
-from sim.scene import SceneState
+from sim.scene import Held, SceneState
 
 DOMAIN = read_domain(read_text(Path(skills.__file__).parent / "domain.pddl"))
 PRIMITIVES = ("pick", "place", "wipe", "drag", "drag_aside")
@@ -571,6 +573,16 @@ def test_planning_goes_on_from_what_the_hand_holds(tabletop, stand_in):
     holding = solution.scenes[0]
     assert labels(run.plan(holding, "(in_bin crumb dustpan)")) == ["wipe(crumb, table, dustpan)"]
     assert labels(run.plan(holding, CUP_AWAY))[0].startswith("place(sponge, ")
+
+
+def test_what_is_held_so_that_nothing_can_be_done_with_it_is_put_down_and_taken_up_anew(tabletop, stand_in):
+    askew = SE3(pin.rpy.rpyToMatrix(0.0, 0.3, 0.0), np.zeros(3))
+    skill = stand_in(rule(wipe_crumb=lambda n, scene: set() if scene.held.X_GO.isApprox(askew) else None))
+    scene = replace(tabletop("cup", "crumb"), held=Held("sponge", askew))
+    found = labels(Run(skill).plan(scene, "(in_bin crumb dustpan)"))
+    assert found[0].startswith("place(sponge, ")
+    assert found[1].startswith("pick(sponge, ")
+    assert found[2:] == ["wipe(crumb, table, dustpan)"]
 
 
 def test_what_is_refined_once_is_not_refined_again_in_the_same_scene(tabletop, stand_in, is_at_start):
