@@ -10,8 +10,8 @@ from skills.control.state import ArmState
 FREELY = 0.5
 """Share of a joint's speed limit up to which it gives way freely."""
 
-BRAKING = 300.0
-"""1/s with which what is beyond that is braked: stable at 500 Hz, whatever the push."""
+BRAKING = 80.0
+"""1/s with which what is beyond that is braked: stable at 500 Hz, and with joint states that come 10 ms late."""
 
 WIDTH = 0.35
 """Rad before a stop at which a joint begins to be held back."""
