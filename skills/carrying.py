@@ -14,9 +14,14 @@ STEP = 0.02
 
 def carried(robot: RobotModel, trajectory: Trajectory, held: Held | None) -> Trajectory:
     """The trajectory, slowed down as far as the acceleration of what the hand holds asks for."""
+    peak = acceleration(robot, trajectory, held)
+    return trajectory if peak <= MAX_ACCELERATION else trajectory.slowed(float(np.sqrt(peak / MAX_ACCELERATION)))
+
+
+def acceleration(robot: RobotModel, trajectory: Trajectory, held: Held | None) -> float:
+    """The largest acceleration in m/s² of the held object's centre, over STEP seconds; 0 with an empty hand."""
     if held is None or trajectory.duration <= 2 * STEP:
-        return trajectory
+        return 0.0
     times = np.arange(0.0, trajectory.duration + STEP, STEP)
     centres = np.array([robot.X_WG(trajectory.at(t)[0]).act(held.X_GO.translation) for t in times])
-    acceleration = np.linalg.norm(np.diff(centres, 2, axis=0), axis=1).max() / STEP**2
-    return trajectory.slowed(max(1.0, float(np.sqrt(acceleration / MAX_ACCELERATION))))
+    return float(np.linalg.norm(np.diff(centres, 2, axis=0), axis=1).max()) / STEP**2

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 from planner.failure import Failure, RefinementFailure
+from planner.motion.trajectory import Trajectory
 from planner.refinement import Phase, Refinement
 from planner.task.symbols import GroundAction
 from sim.plant import GripCommand, Observation
@@ -66,6 +68,11 @@ class ActionRun:
             if phase.name == name:
                 return phase
         raise LookupError(f"{self.action} has no phase {name!r}, known: {[phase.name for phase in phases]}")
+
+    def onward(self, phase: Phase) -> Trajectory | None:
+        """What a phase's trajectory passes into without a stop: the next phase's, if it ends moving."""
+        phases = self.refinement.phases if self.refinement and phase.trajectory.ends_moving else ()
+        return next((after.trajectory for one, after in pairwise(phases) if one is phase), None)
 
     def running(self, phase: Phase | None) -> Phase | None:
         """`phase` if it is one of this action's as refined last, else None."""

@@ -96,13 +96,13 @@ class PhaseLeaf(Behaviour):
 
 
 class Follow(PhaseLeaf):
-    """Follows a trajectory in joint space."""
+    """Follows a trajectory in joint space, and passes into the next where it ends moving."""
 
     def begin(self) -> None:
         phase = self.phase
         if phase.held is None:
             self._context.grip.open_to(phase.opening)
-        self._context.controller.follow(Reference(phase.trajectory, "position"))
+        self._context.controller.follow(Reference(phase.trajectory, then=self._run.onward(phase)))
 
     def watch(self) -> Status:
         controller = self._context.controller

@@ -19,19 +19,9 @@ from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Close, Follow, guarded, sequence
 from skills.refine import Refine
-from skills.skill import (
-    Legs,
-    Line,
-    Toolkit,
-    Unfit,
-    Way,
-    beyond_reach,
-    find_way,
-    hand_would_hit,
-    laden,
-    refine_by_sampling,
-)
+from skills.skill import Toolkit, Unfit, beyond_reach, hand_would_hit, laden, refine_by_sampling
 from skills.waypoints import back_off, raised
+from skills.ways import Legs, Line, Way, find_way
 from skills.weigh import Weigh
 
 STANDOFF = 0.08
@@ -135,7 +125,7 @@ class Pick:
 
         def lines(legs: Legs) -> tuple[Line, ...]:
             into, out = legs
-            return Line(ready, into, NEAR_SPEED, touching), Line(grasped, out, NEAR_SPEED, resting)
+            return Line(ready, into, NEAR_SPEED, touching, is_entry=True), Line(grasped, out, NEAR_SPEED, resting)
 
         way = find_way(self._kit, (back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT)), ready, lines)
         if not isinstance(way, Way):

@@ -16,13 +16,13 @@ from planner.task.symbols import GroundAction
 from scenarios.scenario import Region, Scenario, Table
 from scenarios.shapes import Shape, inscribed_radius
 from sim.scene import SceneState
-from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, guarded, sequence
 from skills.refine import Refine
-from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way, hand_would_hit, refine_by_sampling
+from skills.skill import Toolkit, Unfit, hand_would_hit, refine_by_sampling
 from skills.waypoints import back_off, raised
+from skills.ways import Legs, Line, Way, find_way
 
 STANDOFF = 0.12
 RETREAT = 0.12
@@ -141,7 +141,7 @@ class Place:
 
         def lines(legs: Legs) -> tuple[Line, ...]:
             into, out = legs
-            return Line(scene, into, NEAR_SPEED, lowering), Line(released, out, NEAR_SPEED, leaving)
+            return Line(scene, into, NEAR_SPEED, lowering, is_entry=True), Line(released, out, NEAR_SPEED, leaving)
 
         way = find_way(self._kit, (raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT)), scene, lines, touching)
         if not isinstance(way, Way):
@@ -149,7 +149,7 @@ class Place:
         descend, retreat = way.lines
         still = descend.standstill(descend.end)
         return (
-            Phase("pre-place", "move", carried(robot, way.reach, held), scene.opening, held, touching),
+            Phase("pre-place", "move", way.reach, scene.opening, held, touching),
             Phase("descend", "approach", descend, scene.opening, held, lowering),
             Phase("open", "open", still, opening, None, leaving),
             Phase("retreat", "approach", retreat, opening, None, leaving),

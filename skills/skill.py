@@ -14,7 +14,6 @@ from py_trees.behaviour import Behaviour
 
 from planner.failure import Blocked, MotionFailure, RefinementFailure
 from planner.motion.motion_planner import MotionPlanner
-from planner.motion.trajectory import Trajectory
 from planner.refinement import Budget, Hints, Pair, Phase, Refinement, Refiner
 from planner.support import burden
 from planner.task.symbols import GroundAction
@@ -23,12 +22,6 @@ from sim.robot import RobotModel
 from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
 from skills.control.reference import Mode
-
-MAX_PATHS = 4
-"""Joint paths (arm branches) of one sample that are tried, best first."""
-
-AMPLE = 0.2
-"""Rad from every joint limit beyond which a path is as good as any other."""
 
 UNCOUNTED = 30
 """Samples that may fail before any motion is sought, for each try that counts."""
@@ -76,80 +69,6 @@ class Unfit:
 
     reason: str
     culprits: frozenset[str] = frozenset()
-
-
-def paths_through(toolkit: Toolkit, waypoints: Sequence[SE3], scene: SceneState) -> list[list[np.ndarray]]:
-    """Joint paths through poses X_WG of the hand, cut at them into legs (n,7), best first.
-
-    Those clear of the joint limits come first, among them those that begin near the arm and near
-    its start posture: changes of posture on the way would tumble what is held.
-    """
-    robot, home = toolkit.robot, scene.scenario.robot.q0
-
-    def rank(legs: list[np.ndarray]) -> tuple[bool, float]:
-        path = np.concatenate(legs)
-        margin = float(np.minimum(path - robot.q_min, robot.q_max - path).min())
-        from_here, from_home = (float(np.max(np.abs(path[0] - q) / robot.v_max)) for q in (scene.q, home))
-        return margin < AMPLE, from_here + from_home
-
-    return sorted(toolkit.motion.legs(waypoints, home), key=rank)[:MAX_PATHS]
-
-
-Legs = Sequence[np.ndarray]
-"""A joint path cut into legs (n,7) at the hand's waypoints."""
-
-
-@dataclass(frozen=True)
-class Line:
-    """A straight stretch of the hand near contact: joint path (n,7) in `scene` at `speed` (m/s), and what may touch.
-
-    What lies beyond the first `checked` configurations is sought, not meant to be reached (the way
-    down to a surface goes on below it), so it is not checked.
-    """
-
-    scene: SceneState
-    path: np.ndarray
-    speed: float
-    allowed: frozenset[Pair]
-    checked: int | None = None
-
-
-@dataclass(frozen=True)
-class Way:
-    """A free motion to where the first line begins, and the lines as timed."""
-
-    reach: Trajectory
-    lines: tuple[Trajectory, ...]
-
-
-def find_way(
-    toolkit: Toolkit,
-    waypoints: Sequence[SE3],
-    scene: SceneState,
-    lines_of: Callable[[Legs], Sequence[Line]],
-    allowed: frozenset[Pair] = frozenset(),
-) -> "Way | MotionFailure | Unfit":
-    """The first joint path through poses X_WG all of whose lines, and the free motion from scene.q, are free.
-
-    `allowed` pairs may touch during the free motion. Every line is confirmed by the exact model as timed.
-    """
-    motion = toolkit.motion
-    failure: MotionFailure | None = None
-    for legs in paths_through(toolkit, waypoints, scene):
-        lines = lines_of(legs)
-        checks = (motion.line_is_free(line.scene, line.path[: line.checked], line.allowed) for line in lines)
-        failure = next((check for check in checks if check is not None), None)
-        if failure:
-            continue
-        reach = motion.move(scene, [legs[0][0]], allowed)
-        if isinstance(reach, MotionFailure):
-            failure = reach
-            continue
-        timed = [motion.timed_line(line.scene, line.path, line.speed, line.allowed, line.checked) for line in lines]
-        failure = next((line for line in timed if isinstance(line, MotionFailure)), None)
-        if failure is None:
-            return Way(reach, tuple(line for line in timed if isinstance(line, Trajectory)))
-    return failure or Unfit("the arm can't follow the hand's path")
 
 
 def beyond_reach(toolkit: Toolkit, action: GroundAction, scene: SceneState) -> RefinementFailure | None:

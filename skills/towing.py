@@ -21,8 +21,9 @@ from scenarios.solids import body_solid, overlap, region_solid
 from sim.robot import GRAVITY, Gripper
 from sim.scene import Held, SceneState, height_above
 from skills.pressing import Pressing
-from skills.skill import Legs, Line, Toolkit, Unfit, Way, find_way
+from skills.skill import Toolkit, Unfit
 from skills.waypoints import raised, shifted
+from skills.ways import Legs, Line, Way, find_way
 
 HEIGHT = 0.08
 CLOSE = 0.015
@@ -246,7 +247,7 @@ def tow(
         down, near, probe, _, along, _, up = legs
         return (
             Line(dragging, along, pressing.speed, sliding),
-            Line(ready, down, NEAR_SPEED, touching),
+            Line(ready, down, NEAR_SPEED, touching, is_entry=True),
             Line(ready, np.vstack([near, probe[1:]]), TOUCH_SPEED, touching, checked=len(near)),
             Line(moved, up, NEAR_SPEED, touching),
         )

@@ -20,7 +20,6 @@ from planner.task.symbols import GroundAction
 from scenarios.regions import interior
 from scenarios.shapes import Box, Compound, Hull, Shape, bounding_radius, extents, middle, reach
 from sim.scene import Held, SceneState
-from skills.carrying import carried
 from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.gathering import Place, strokes_for
@@ -28,9 +27,10 @@ from skills.motions import Follow, Slide, Touch, guarded, sequence
 from skills.pick import grip_force
 from skills.pressing import Pressing, in_order
 from skills.refine import PathFree, Refine
-from skills.skill import ContactSettings, Legs, Line, Toolkit, Unfit, Way, find_way, refine_by_sampling
+from skills.skill import ContactSettings, Toolkit, Unfit, refine_by_sampling
 from skills.strokes import Crumbs, Opening, Stroke, Tool, along, left, opening_of, top_of
 from skills.waypoints import raised, shifted
+from skills.ways import Legs, Line, Way, find_way
 
 HEIGHT = 0.08
 CLOSE = 0.015
@@ -215,7 +215,7 @@ class Wipe:
             course = np.vstack([first, *(leg[1:] for leg in rest)])
             return (
                 Line(pressed, course, pressing.speed, touching),
-                Line(pressed, down, NEAR_SPEED, touching),
+                Line(pressed, down, NEAR_SPEED, touching, is_entry=True),
                 Line(pressed, np.vstack([near, probe[1:]]), TOUCH_SPEED, touching, checked=len(near)),
                 Line(pressed, up, NEAR_SPEED, touching),
             )
@@ -226,7 +226,7 @@ class Wipe:
         course, down, probe, up = way.lines
         press = pressing.press
         return (
-            Phase("pre-wipe", "move", carried(robot, way.reach, held), scene.opening, held, gripping),
+            Phase("pre-wipe", "move", way.reach, scene.opening, held, gripping),
             Phase("approach", "approach", down, scene.opening, held, sweeping),
             Phase("descend", "touch", probe, scene.opening, held, sweeping, press),
             Phase("stroke", "slide", course, scene.opening, held, sweeping, press),

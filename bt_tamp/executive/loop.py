@@ -224,7 +224,7 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
         tally.energy_j += power * SAMPLE_EVERY * CONTROL_EVERY * machine.plant.timestep
         reference = controller.reference
         wanted = reference.force if reference else 0.0
-        q_ref = reference.trajectory.at(controller.time_in_reference)[0] if reference else observation.q
+        q_ref = reference.course.at(controller.time_in_reference)[0] if reference else observation.q
         p_ref = machine.robot.X_WG(q_ref).translation if wanted else None
         # What is recorded is what was, not what was sensed.
         truth = machine.plant.truth() if isinstance(machine.plant, DisturbedPlant) else observation

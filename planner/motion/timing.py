@@ -80,7 +80,7 @@ def time_line(
 
 
 def joined(pieces: Sequence[Trajectory]) -> Trajectory:
-    """Motions one after the other, each beginning where the one before came to rest."""
+    """Motions one after the other, each beginning where, and with the velocity with which, the one before ended."""
     times, start = [np.zeros(1)], 0.0
     for piece in pieces:
         times.append(piece.times[1:] - piece.times[0] + start)
@@ -92,11 +92,15 @@ def joined(pieces: Sequence[Trajectory]) -> Trajectory:
 
 def slowed(trajectory: Trajectory, robot: RobotModel, part: float = 1.0) -> Trajectory:
     """The same motion, stretched in time as a whole if it passes `part` of the robot's limits anywhere."""
-    velocity, acceleration = _peaks(trajectory)
-    rate = max(
-        float(np.max(velocity / robot.v_max)) / part, float(np.sqrt(np.max(acceleration / robot.a_max) / part)), 1.0
-    )
+    rate = max(haste(trajectory, robot, part), 1.0)
     return Trajectory(trajectory.times * rate, trajectory.q.copy(), trajectory.v / rate)
+
+
+def haste(trajectory: Trajectory, robot: RobotModel, part: float = 1.0) -> float:
+    """How many times longer the motion would have to take to just keep within `part` of the robot's velocity and
+    acceleration limits; 1 or less if it does."""
+    velocity, acceleration = _peaks(trajectory)
+    return max(float(np.max(velocity / robot.v_max)) / part, float(np.sqrt(np.max(acceleration / robot.a_max) / part)))
 
 
 def _peaks(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:

@@ -6,13 +6,17 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
+SAME = 1e-6
+"""Seconds below which two knots are one."""
+
 
 @dataclass(frozen=True)
 class Trajectory:
     """Joint configurations q (n,7) in rad and velocities v (n,7) in rad/s at strictly rising times (n,) in s.
 
     Between knots the motion is the cubic Hermite polynomial through both ends, so position and
-    velocity are continuous. Before the first and after the last knot it stands still there.
+    velocity are continuous. Before the first and after the last knot it stands still there; one that
+    `ends_moving` is meant to be followed by another that goes on from there.
     """
 
     times: np.ndarray
@@ -56,6 +60,11 @@ class Trajectory:
     def end(self) -> np.ndarray:
         return self.q[-1]
 
+    @property
+    def ends_moving(self) -> bool:
+        """Is it still under way at its last knot?"""
+        return bool(np.any(self.v[-1]))
+
     @cached_property
     def length(self) -> float:
         """Length of the joint path in rad (Euclidean over the joints, knot to knot)."""
@@ -74,6 +83,13 @@ class Trajectory:
         m0, m1 = h * self.v[:-1], h * self.v[1:]
         d = np.diff(self.q, axis=0)
         return np.stack([self.q[:-1], m0, 3 * d - 2 * m0 - m1, m0 + m1 - 2 * d], axis=1)
+
+    def until(self, t: float) -> "Trajectory":
+        """The first t seconds, 0 < t < duration; ends moving unless it stands there."""
+        since = self.times - self.times[0]
+        early = since < t - SAME
+        q, v, _ = self.at(t)
+        return Trajectory(np.append(since[early], t), np.vstack([self.q[early], q]), np.vstack([self.v[early], v]))
 
     def sampled(self, step: float) -> np.ndarray:
         """Configurations (k,7) every `step` seconds, both ends included."""

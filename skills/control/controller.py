@@ -157,13 +157,15 @@ class ArmController:
 
     @property
     def finished(self) -> bool:
-        """Whether the trajectory's time is over and the arm at rest (in position mode: there), or,
-        until contact, the force has been ramped up and settled. Never once `stopped`."""
+        """Whether the trajectory's time is over and the arm at rest (in position mode: there), unless it passes into
+        another, or, until contact, the force has been ramped up and settled. Never once `stopped`."""
         state = self._state
         if state is None or self._pending is not None or self._hold_pending or self.stopped is not None:
             return False
         if self._reference is not None and self._reference.until_contact and self._pressed:
             return self._loop.time_since_ramp >= PRESSED_SETTLING
+        if self._reference is not None and self._reference.then is not None:
+            return self._course.time >= self._reference.trajectory.duration
         if not self._course.over or np.abs(state.v).max() > AT_REST:
             return False
         in_position = self._reference is None or self._reference.mode == "position"
@@ -267,9 +269,14 @@ class ArmController:
         return tau.copy()
 
     def _begin(self, reference: Reference, state: ArmState) -> None:
+        before = self._reference
+        if before is not None and before.then is not None and before.then is reference.trajectory:
+            self._reference, self._pending = reference, None
+            self._course = self._course.passed(reference.course, before.trajectory.duration)
+            return
         was_regulated = self._pressed and self._reference is not None and self._reference.mode == "hybrid"
         self._reference, self._pending = reference, None
-        self._slowed, trajectory = 1.0, reference.trajectory
+        self._slowed, trajectory = 1.0, reference.course
         if reference.until_contact:
             self._slowed = near_contact(self._dynamics, reference, APPROACH_SPEED)
             trajectory = trajectory.slowed(self._slowed)

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from planner.motion.timing import joined
 from planner.motion.trajectory import Trajectory
 from skills.control.dynamics import Dynamics
 
@@ -32,6 +33,8 @@ class Reference:
     until_contact: the trajectory leads through the expected surface and is followed until the tool
     touches; time then stands still and the force ramps up. Otherwise a reference with a force
     presses from its start on.
+    then: in position mode, what the trajectory passes into at its end, where it need not stand still: a reference
+    to that, told in time, goes on from there.
 
     Raises ValueError for parts that don't fit together.
     """
@@ -43,6 +46,7 @@ class Reference:
     R_WC: np.ndarray = field(default_factory=lambda: np.eye(3))
     until_contact: bool = False
     damping: float = 1.0
+    then: Trajectory | None = None
 
     def __post_init__(self) -> None:
         if self.mode not in ("position", "impedance", "hybrid"):
@@ -57,10 +61,17 @@ class Reference:
             raise ValueError("hybrid mode needs a force above 0 N")
         if self.until_contact and self.force == 0.0:
             raise ValueError("a reference until contact needs a force above 0 N")
+        if self.then is not None and self.mode != "position":
+            raise ValueError(f"{self.mode} mode can't pass into another trajectory, expected position")
         if self.mode == "impedance":
             stiffness = np.zeros(0) if self.stiffness is None else np.asarray(self.stiffness, dtype=float)
             if stiffness.shape != (6,) or not (stiffness > 0.0).all():
                 raise ValueError(f"impedance needs six positive stiffnesses, got {self.stiffness}")
+
+    @cached_property
+    def course(self) -> Trajectory:
+        """The trajectory with what it passes into."""
+        return self.trajectory if self.then is None else joined([self.trajectory, self.then])
 
     @cached_property
     def normal(self) -> np.ndarray:
@@ -125,6 +136,12 @@ class Course:
         duration = max(SHORTEST_JOINING, float((1.5 * np.abs(v) / a_max).max()))
         rest = q + v * duration / 2
         return Course(Trajectory.standstill(rest), Fade(q - rest, v, duration))
+
+    def passed(self, trajectory: Trajectory, duration: float) -> "Course":
+        """The same course, seen as one along `trajectory`, the first `duration` seconds of it being over."""
+        onward = Course(trajectory, self._fade)
+        onward.time, onward._elapsed = self.time - duration, self._elapsed
+        return onward
 
     @property
     def over(self) -> bool:

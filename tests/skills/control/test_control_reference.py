@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planner.motion.timing import joined
 from planner.motion.trajectory import Trajectory
 from skills.control.reference import Course, Reference
 
@@ -66,6 +67,7 @@ def test_a_frozen_course_stays_where_it_was():
         ({"force": 3.0}, "position mode can't press with 3.0 N"),
         ({"mode": "hybrid"}, "needs a force above 0"),
         ({"mode": "impedance", "until_contact": True, "stiffness": np.ones(6)}, "needs a force above 0"),
+        ({"mode": "hybrid", "force": 3.0, "then": STAY}, "hybrid mode can't pass into another trajectory"),
         ({"mode": "impedance"}, "six positive stiffnesses, got None"),
         ({"mode": "impedance", "stiffness": np.zeros(6)}, "six positive stiffnesses"),
         ({"mode": "impedance", "stiffness": np.ones(3)}, "six positive stiffnesses"),
@@ -74,3 +76,15 @@ def test_a_frozen_course_stays_where_it_was():
 def test_references_that_make_no_sense_are_refused(parts, complaint):
     with pytest.raises(ValueError, match=complaint):
         Reference(STAY, **parts)
+
+
+def test_a_course_that_passes_into_another_goes_on_as_if_it_were_one():
+    q = np.stack([np.zeros(7), np.full(7, 0.3), np.full(7, 0.5)])
+    v = np.stack([np.zeros(7), np.full(7, 0.4), np.zeros(7)])
+    first, second = Trajectory(np.array([0.0, 1.0]), q[:2], v[:2]), Trajectory(np.array([0.0, 0.8]), q[1:], v[1:])
+    course = Course.joined(Reference(first, then=second).course, np.full(7, 0.05), np.zeros(7), A_MAX)
+    seen = walked(course, 1.01)
+    seen = [np.concatenate(parts) for parts in zip(seen, walked(course.passed(second, 1.0), 1.0), strict=True)]
+    whole = Course.joined(joined([first, second]), np.full(7, 0.05), np.zeros(7), A_MAX)
+    for part, same in zip(seen, walked(whole, 2.01), strict=True):
+        np.testing.assert_allclose(part, same, atol=1e-9)

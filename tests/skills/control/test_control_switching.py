@@ -1,5 +1,7 @@
 import numpy as np
+import pytest
 
+from planner.motion.passing import passing
 from planner.motion.trajectory import Trajectory
 from skills.control.reference import Reference
 
@@ -112,3 +114,43 @@ def test_the_same_run_gives_the_same_torques_to_the_last_bit(lab):
         return np.array(rig.run(0.2, lambda _: rig.tau.copy()))
 
     np.testing.assert_array_equal(run(), run())
+
+
+def test_the_arm_passes_from_one_motion_into_the_next_without_a_stop(lab):
+    rig = lab.rig(lab.home)
+    rig.run(0.01)
+    first = lab.straight(rig.q, [0.12, 0.0, 0.0], 0.3)
+    second = lab.straight(first.end, [0.0, 0.12, 0.0], 0.3)
+    head, entry = passing(first, second, 0.3 * min(first.duration, second.duration))
+    steps = lab.steps(rig)
+    rig.controller.follow(Reference(head, then=entry))
+    while not rig.controller.finished:
+        rig.run(0.002, steps)
+    # The tree comes to look a little later.
+    rig.run(0.016, steps)
+    assert np.linalg.norm(rig.plant.observe().v) > 0.05
+    late = rig.controller.time_in_reference
+    rig.controller.follow(Reference(entry))
+    tau = rig.tau.copy()
+    rig.run(0.002, steps)
+    assert np.abs(rig.tau - tau).max() < 0.5
+    assert rig.controller.time_in_reference == pytest.approx(late - head.duration + 0.002)
+    off = rig.run(entry.duration, lambda seen: steps(seen) or rig.controller.tracking_error.joint)
+    assert steps.largest < LARGEST_STEP
+    assert max(off) < 2e-3
+    assert rig.controller.finished
+    np.testing.assert_allclose(rig.q, second.end, atol=2e-3)
+
+
+def test_a_motion_that_passes_into_another_can_be_stopped_in_between(lab):
+    rig = lab.rig(lab.home)
+    rig.run(0.01)
+    first = lab.straight(rig.q, [0.12, 0.0, 0.0], 0.3)
+    head, entry = passing(first, lab.straight(first.end, [0.0, 0.12, 0.0], 0.3), 0.2)
+    rig.controller.follow(Reference(head, then=entry))
+    rig.run(head.duration + 0.01)
+    rig.controller.hold()
+    rig.run(0.6)
+    assert rig.controller.finished
+    assert rig.controller.reference is None
+    assert np.abs(rig.q - entry.start).max() < 0.2
