@@ -20,8 +20,9 @@ from skills.context import ActionRun, SkillContext
 from skills.motions import Close, Follow, guarded, sequence
 from skills.refine import Refine
 from skills.skill import Toolkit, Unfit, beyond_reach, hand_would_hit, laden, refine_by_sampling
+from skills.way_search import find_way
 from skills.waypoints import back_off, raised
-from skills.ways import Legs, Line, Way, find_way
+from skills.ways import Legs, Line, Way
 from skills.weigh import Weigh
 
 STANDOFF = 0.08
@@ -130,7 +131,7 @@ class Pick:
         way = find_way(self._kit, (back_off(X_WG, STANDOFF), X_WG, raised(X_WG, LIFT)), ready, lines)
         if not isinstance(way, Way):
             return way
-        approach, lift = way.lines
+        approach, lift = way.timed
         still = approach.standstill(approach.end)
         return (
             Phase("pre-grasp", "move", way.reach, opening),

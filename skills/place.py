@@ -21,8 +21,9 @@ from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, guarded, sequence
 from skills.refine import Refine
 from skills.skill import Toolkit, Unfit, hand_would_hit, refine_by_sampling
+from skills.way_search import find_way
 from skills.waypoints import back_off, raised
-from skills.ways import Legs, Line, Way, find_way
+from skills.ways import Legs, Line, Way
 
 STANDOFF = 0.12
 RETREAT = 0.12
@@ -146,7 +147,7 @@ class Place:
         way = find_way(self._kit, (raised(X_WG, STANDOFF), X_WG, back_off(X_WG, RETREAT)), scene, lines, touching)
         if not isinstance(way, Way):
             return way
-        descend, retreat = way.lines
+        descend, retreat = way.timed
         still = descend.standstill(descend.end)
         return (
             Phase("pre-place", "move", way.reach, scene.opening, held, touching),

@@ -65,7 +65,8 @@ class Refine(Behaviour):
         if self._outcome is None:
             if self._stopping_since is None:
                 self._stopping_since = now
-                context.controller.hold()
+                if not context.controller.finished:
+                    context.controller.hold()
             if not context.controller.finished and now - self._stopping_since < PATIENCE:
                 return Status.RUNNING
             self._scene = context.scene

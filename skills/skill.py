@@ -5,7 +5,7 @@ behaviour tree that carries it out (`subtree`). One primitive, one file.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,6 +22,7 @@ from sim.robot import RobotModel
 from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
 from skills.control.reference import Mode
+from skills.ways import KnownWays
 
 UNCOUNTED = 30
 """Samples that may fail before any motion is sought, for each try that counts."""
@@ -56,11 +57,12 @@ class ContactSettings:
 
 @dataclass(frozen=True)
 class Toolkit:
-    """What skills refine with."""
+    """What skills refine with. known: ways of the hand found earlier."""
 
     robot: RobotModel
     motion: MotionPlanner
     contact: ContactSettings
+    known: KnownWays = field(default_factory=KnownWays)
 
 
 @dataclass(frozen=True)

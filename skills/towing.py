@@ -22,8 +22,9 @@ from sim.robot import GRAVITY, Gripper
 from sim.scene import Held, SceneState, height_above
 from skills.pressing import Pressing
 from skills.skill import Toolkit, Unfit
+from skills.way_search import find_way
 from skills.waypoints import raised, shifted
-from skills.ways import Legs, Line, Way, find_way
+from skills.ways import Legs, Line, Way
 
 HEIGHT = 0.08
 CLOSE = 0.015
@@ -255,7 +256,7 @@ def tow(
     way = find_way(toolkit, waypoints, ready, lines)
     if not isinstance(way, Way):
         return way
-    along, down, probe, up = way.lines
+    along, down, probe, up = way.timed
     press = pressing.press
     return (
         Phase("close", "open", way.reach.standstill(scene.q), 0.0),

@@ -1,4 +1,4 @@
-"""Ways of the hand: a free motion to where its lines begin, the lines themselves, and how one passes into the other."""
+"""What a way of the hand is, and a memory for ways, so that an action planned again costs only what has changed."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,46 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from pinocchio import SE3
 
-from planner.failure import MotionFailure
-from planner.motion.passing import passing
-from planner.motion.timing import haste
+from planner.motion.motion_planner import MotionPlanner
 from planner.motion.trajectory import Trajectory
 from planner.refinement import Pair
-from sim.scene import SceneState
-from skills.carrying import MAX_ACCELERATION, acceleration, carried
-from skills.skill import Toolkit, Unfit
+from sim.scene import SceneState, pose_distance
 
-MAX_PATHS = 4
-"""Joint paths (arm branches) of one sample that are tried, best first."""
+SAME = 1e-4
+"""Metres or rad by which two poses, configurations (in any joint) or openings may differ and count as the same: a tenth
+of the margin that timed motions keep."""
 
-AMPLE = 0.2
-"""Rad from every joint limit beyond which a path is as good as any other."""
-
-OVERLAPS = (0.4, 0.2)
-"""Seconds before the end of a free motion at which the line after it begins, the first that is free."""
-
-MOST_OVERLAP = 1 / 3
-"""Of either motion's duration."""
-
-LEAST_OVERLAP = 0.05
-"""Seconds below which it isn't worth while."""
-
-
-def paths_through(toolkit: Toolkit, waypoints: Sequence[SE3], scene: SceneState) -> list[list[np.ndarray]]:
-    """Joint paths through poses X_WG of the hand, cut at them into legs (n,7), best first.
-
-    Those clear of the joint limits come first, among them those that begin near the arm and near
-    its start posture: changes of posture on the way would tumble what is held.
-    """
-    robot, home = toolkit.robot, scene.scenario.robot.q0
-
-    def rank(legs: list[np.ndarray]) -> tuple[bool, float]:
-        path = np.concatenate(legs)
-        margin = float(np.minimum(path - robot.q_min, robot.q_max - path).min())
-        from_here, from_home = (float(np.max(np.abs(path[0] - q) / robot.v_max)) for q in (scene.q, home))
-        return margin < AMPLE, from_here + from_home
-
-    return sorted(toolkit.motion.legs(waypoints, home), key=rank)[:MAX_PATHS]
+MOST = 200
+"""Ways that are remembered, the latest."""
 
 
 Legs = Sequence[np.ndarray]
@@ -71,63 +42,95 @@ class Line:
 
 @dataclass(frozen=True)
 class Way:
-    """A free motion to where the first leg begins, and the lines as timed. Where the motion ends moving, the entry
-    goes on from there."""
+    """A free motion to where the first leg begins, and the lines as timed. Where the motion ends moving, the line that
+    is its entry goes on from there.
 
-    reach: Trajectory
-    lines: tuple[Trajectory, ...]
-
-
-def find_way(
-    toolkit: Toolkit,
-    waypoints: Sequence[SE3],
-    scene: SceneState,
-    lines_of: Callable[[Legs], Sequence[Line]],
-    allowed: frozenset[Pair] = frozenset(),
-) -> "Way | MotionFailure | Unfit":
-    """The first joint path through poses X_WG all of whose lines, and the free motion from scene.q, are free.
-
-    `allowed` pairs may touch during the free motion, which is as slow as what is held asks for. Every line is
-    confirmed by the exact model as timed.
+    It leads through poses X_WG in `scene` along the legs, and `allowed` pairs may touch during the free motion.
     """
-    motion = toolkit.motion
-    failure: MotionFailure | None = None
-    for legs in paths_through(toolkit, waypoints, scene):
-        lines = lines_of(legs)
-        checks = (motion.line_is_free(line.scene, line.path[: line.checked], line.allowed) for line in lines)
-        failure = next((check for check in checks if check is not None), None)
-        if failure:
-            continue
-        reach = motion.move(scene, [legs[0][0]], allowed)
-        if isinstance(reach, MotionFailure):
-            failure = reach
-            continue
-        timed = [motion.timed_line(line.scene, line.path, line.speed, line.allowed, line.checked) for line in lines]
-        failure = next((line for line in timed if isinstance(line, MotionFailure)), None)
-        if failure is None:
-            reach = carried(toolkit.robot, reach, scene.held)
-            done = [line for line in timed if isinstance(line, Trajectory)]
-            for k, line in enumerate(lines):
-                if line.is_entry:
-                    reach, done[k] = entered(toolkit, reach, line, done[k], allowed)
-            return Way(reach, tuple(done))
-    return failure or Unfit("the arm can't follow the hand's path")
+
+    waypoints: tuple[SE3, ...]
+    scene: SceneState
+    allowed: frozenset[Pair]
+    legs: tuple[np.ndarray, ...]
+    lines: tuple[Line, ...]
+    reach: Trajectory
+    timed: tuple[Trajectory, ...]
 
 
-def entered(
-    toolkit: Toolkit, reach: Trajectory, line: Line, timed: Trajectory, allowed: frozenset[Pair]
-) -> tuple[Trajectory, Trajectory]:
-    """The free motion and the line after it, without a stop between them if there is room to cut the corner: while
-    the free motion lasts nothing but its own `allowed` pairs touch."""
-    robot, motion = toolkit.robot, toolkit.motion
-    longest = MOST_OVERLAP * min(reach.duration, timed.duration)
-    for overlap in dict.fromkeys(min(seconds, longest) for seconds in OVERLAPS):
-        if overlap < LEAST_OVERLAP:
-            break
-        head, entry = passing(reach, timed, overlap)
-        if haste(entry, robot) > 1.0 or acceleration(robot, entry, line.scene.held) > MAX_ACCELERATION:
-            continue
-        corner = entry.until(overlap)
-        if motion.audit(line.scene, corner, allowed) is None and motion.audit(line.scene, entry, line.allowed) is None:
-            return head, entry
-    return reach, timed
+class KnownWays:
+    """The ways found last. One that is sought again, with the arm and the hand as they were, is taken again if what has
+    moved since, or is new, is nowhere in its way by the exact model."""
+
+    def __init__(self) -> None:
+        self._ways: list[Way] = []
+
+    def keep(self, way: Way) -> None:
+        """Remember a way, and forget the oldest."""
+        self._ways = [way, *self._ways[: MOST - 1]]
+
+    def find(
+        self,
+        motion: MotionPlanner,
+        waypoints: Sequence[SE3],
+        scene: SceneState,
+        lines_of: Callable[[Legs], Sequence[Line]],
+        allowed: frozenset[Pair],
+    ) -> Way | None:
+        """A way found earlier that still is one, for what `find_way` is asked for."""
+        for way in self._ways:
+            if not _is_same_hand(way.scene, scene) or not _are_same(way.waypoints, waypoints) or way.allowed != allowed:
+                continue
+            lines = tuple(lines_of(way.legs))
+            if list(map(_manner, lines)) != list(map(_manner, way.lines)):
+                continue
+            moved = _moved(way.scene, scene)
+            if moved is not None and (not moved or _is_free(motion, way, scene, lines, moved)):
+                return way
+        return None
+
+
+def _is_free(motion: MotionPlanner, way: Way, scene: SceneState, lines: Sequence[Line], moved: frozenset[str]) -> bool:
+    """Is nothing of what has moved in the way?"""
+    if motion.audit(scene, way.reach, way.allowed, only=moved) is not None:
+        return False
+    for line, timed in zip(lines, way.timed, strict=True):
+        if line.checked is None:
+            failure = motion.audit(line.scene, timed, line.allowed, only=moved)
+        else:
+            failure = motion.line_is_free(line.scene, line.path[: line.checked], line.allowed)
+        if failure is not None:
+            return False
+    return True
+
+
+def _is_same_hand(before: SceneState, now: SceneState) -> bool:
+    """Is the arm where it was, with the hand as open, holding the same in the same way?"""
+    if np.abs(before.q - now.q).max() > SAME or abs(before.opening - now.opening) > SAME:
+        return False
+    if before.held is None or now.held is None:
+        return before.held is now.held
+    return before.held.name == now.held.name and _are_same([before.held.X_GO], [now.held.X_GO])
+
+
+def _are_same(before: Sequence[SE3], now: Sequence[SE3]) -> bool:
+    return len(before) == len(now) and all(max(pose_distance(*both)) <= SAME for both in zip(before, now, strict=True))
+
+
+def _manner(line: Line) -> tuple[int, float, frozenset[Pair], int | None, bool]:
+    """What is asked of a line, but for its surroundings."""
+    return len(line.path), line.speed, line.allowed, line.checked, line.is_entry
+
+
+def _moved(before: SceneState, now: SceneState) -> frozenset[str] | None:
+    """Names of what is elsewhere now, or new; None if that is not all that has changed."""
+    then, here = before.scenario, now.scenario
+    if then.table is not here.table or then.fixtures is not here.fixtures or then.robot is not here.robot:
+        return None
+    held = now.held.name if now.held else ""
+    bodies = {
+        n
+        for n, X in now.poses.items()
+        if n != held and (n not in before.poses or not _are_same([before.poses[n]], [X]))
+    }
+    regions = {n for n, region in here.regions.items() if then.regions.get(n) is not region}
+    return frozenset(bodies | regions)

@@ -29,8 +29,9 @@ from skills.pressing import Pressing, in_order
 from skills.refine import PathFree, Refine
 from skills.skill import ContactSettings, Toolkit, Unfit, refine_by_sampling
 from skills.strokes import Crumbs, Opening, Stroke, Tool, along, left, opening_of, top_of
+from skills.way_search import find_way
 from skills.waypoints import raised, shifted
-from skills.ways import Legs, Line, Way, find_way
+from skills.ways import Legs, Line, Way
 
 HEIGHT = 0.08
 CLOSE = 0.015
@@ -223,7 +224,7 @@ class Wipe:
         way = find_way(self._kit, waypoints, scene, lines, gripping)
         if not isinstance(way, Way):
             return way
-        course, down, probe, up = way.lines
+        course, down, probe, up = way.timed
         press = pressing.press
         return (
             Phase("pre-wipe", "move", way.reach, scene.opening, held, gripping),

@@ -1,89 +1,83 @@
-"""How the hand comes to where its lines begin: without a stop, where there is room to cut the corner."""
+"""Ways of the hand that are sought again: only what has changed is looked at, and it is looked at."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from bench import TICKS_PER_TREE, Bench, action, scene_with
-from py_trees.common import Status
+from bench import Bench, action, scene_with, with_pose
+from pinocchio import SE3
 
-from planner.motion.timing import haste, joined
-from planner.refinement import Phase, Refinement
-from scenarios.scenario import Fixture
-from scenarios.shapes import Box
-from skills.carrying import MAX_ACCELERATION, acceleration
-from skills.context import ActionRun
-from skills.motions import Follow
-from skills.skill import ContactSettings, Toolkit
-from skills.waypoints import raised, shifted
-from skills.ways import Line, entered
+from planner.refinement import Budget, Hints, Refinement
+from sim.scene import SceneState
+
+PICK = action("pick(box, table)")
 
 
-def _phases(bench: Bench, text: str) -> dict[str, Phase]:
-    found = bench.refine(action(text))
+@pytest.fixture
+def bench() -> Bench:
+    return Bench(scene_with("box", "carrot"))
+
+
+def _pick(bench: Bench, scene: SceneState, sample: object = None) -> tuple[Refinement, int]:
+    """Box picked in a scene with the sample to be tried first, and the configurations checked for that."""
+    counts = bench.motion.work.counts
+    before = counts.get("exact_checks", 0) + counts.get("checks", 0)
+    hints = Hints(first=() if sample is None else (sample,))
+    found = bench.skills["pick"].refine(PICK, scene, np.random.default_rng(0), Budget(), hints)
     assert isinstance(found, Refinement), found
-    return {phase.name: phase for phase in found.phases}
+    return found, counts["exact_checks"] + counts["checks"] - before
 
 
-@pytest.mark.parametrize(
-    ("bodies", "before", "text", "names"),
-    [
-        (("box",), (), "pick(box, table)", ("pre-grasp", "approach")),
-        (("box",), ("pick(box, table)",), "place(box, right_bin)", ("pre-place", "descend")),
-        (("book",), (), "drag(book, table)", ("pre-drag", "approach")),
-        (("sponge", "carrot"), ("pick(sponge, dustpan)",), "wipe(carrot, table, dustpan)", ("pre-wipe", "approach")),
-    ],
-)
-def test_every_skill_comes_to_its_line_without_a_stop(bodies, before, text, names):
-    bench = Bench(scene_with(*bodies))
-    for earlier in before:
-        assert bench.do(earlier) is Status.SUCCESS
-    phases = _phases(bench, text)
-    first = phases[names[0]]
-    reach, entry = (phases[name].trajectory for name in names)
-    assert reach.ends_moving
-    np.testing.assert_allclose(reach.q[-1], entry.q[0], atol=1e-9)
-    np.testing.assert_allclose(reach.v[-1], entry.v[0], atol=1e-9)
-    assert haste(joined([reach, entry]), bench.robot) <= 1.0 + 1e-9
-    assert acceleration(bench.robot, entry, bench.scene.held) <= MAX_ACCELERATION
-    # As long as the reach lasts nothing is touched, not even what the line is for.
-    ready = replace(bench.scene, opening=first.opening)
-    assert bench.motion.audit(ready, reach, first.allowed) is None
-    assert bench.motion.audit(ready, entry.until(0.2), first.allowed) is None
+def _is_free(bench: Bench, scene: SceneState, found: Refinement) -> bool:
+    ready = replace(scene, opening=found.phases[0].opening)
+    moves = [phase for phase in found.phases if phase.name in ("pre-grasp", "approach")]
+    return all(bench.motion.audit(ready, phase.trajectory, phase.allowed) is None for phase in moves)
 
 
-def test_the_arm_keeps_moving_from_the_reach_into_the_approach():
-    bench = Bench(scene_with("box"))
-    what = action("pick(box, table)")
-    found = bench.refine(what)
-    assert isinstance(found, Refinement)
-    run, context = ActionRun(what, found), bench.context
-    speeds = []
-    for leaf in (Follow("pre-grasp", run, context), Follow("approach", run, context)):
-        leaf.tick_once()
-        while leaf.status is Status.RUNNING:
-            bench.run(TICKS_PER_TREE)
-            speeds.append(float(np.linalg.norm(context.observation.v)))
-            leaf.tick_once()
-        assert leaf.status is Status.SUCCESS
-    moving = np.flatnonzero(np.array(speeds) > 0.1)
-    assert min(speeds[moving[0] : moving[-1]]) > 0.05
-    assert speeds[-1] < 0.05
+def test_a_way_that_is_sought_again_costs_next_to_nothing(bench):
+    first, checks = _pick(bench, bench.scene)
+    again, fewer = _pick(bench, bench.scene, first.sample)
+    assert again.phases[0].trajectory is first.phases[0].trajectory
+    assert fewer < 0.02 * checks
 
 
-def test_a_corner_with_something_in_it_is_not_cut():
-    bench = Bench(scene_with("box"))
-    scene = bench.scene
-    toolkit = Toolkit(bench.robot, bench.motion, ContactSettings())
-    X_WG = bench.robot.X_WG(scene.q)
-    there = shifted(X_WG, np.array([0.0, 0.15, 0.0]))
-    path = bench.motion.lines([there, raised(there, -0.08)], scene.q)[0]
-    reach, line = bench.motion.move(scene, [path[0]]), Line(scene, path, 0.15, frozenset())
-    timed = bench.motion.timed_line(scene, path, 0.15)
-    cut, entry = entered(toolkit, reach, line, timed, frozenset())
-    assert cut.ends_moving
-    post = Fixture("post", Box((0.02, 0.15, 0.02)), bench.robot.X_WG(entry.at(0.1)[0]), 0.5, (1.0, 1.0, 1.0, 1.0))
-    walled = replace(scene, scenario=replace(scene.scenario, fixtures={"post": post}))
-    kept, after = entered(toolkit, reach, replace(line, scene=walled), timed, frozenset())
-    assert kept is reach
-    assert after is timed
+def test_what_moved_elsewhere_costs_one_look(bench):
+    first, checks = _pick(bench, bench.scene)
+    X_WO = bench.scene.poses["carrot"]
+    aside = bench.scene.moved("carrot", SE3(X_WO.rotation, X_WO.translation + np.array([0.01, 0.0, 0.0])))
+    again, fewer = _pick(bench, aside, first.sample)
+    assert again.phases[0].trajectory is first.phases[0].trajectory
+    assert 0.02 * checks < fewer < checks
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.7])
+def test_what_came_to_be_in_the_way_is_avoided(bench, share):
+    first, _ = _pick(bench, bench.scene)
+    reach = first.phases[0].trajectory
+    spot = bench.robot.X_WG(reach.at(share * reach.duration)[0])
+    walled = bench.scene.moved("carrot", SE3(np.eye(3), spot.translation + np.array([0.0, 0.0, 0.06])))
+    assert not _is_free(bench, walled, first)
+    again, _ = _pick(bench, walled, first.sample)
+    assert again.phases[0].trajectory is not first.phases[0].trajectory
+    assert _is_free(bench, walled, again)
+
+
+def test_a_shifted_bin_is_looked_at(bench):
+    first, _ = _pick(bench, bench.scene)
+    reach = first.phases[0].trajectory
+    scenario = bench.scene.scenario
+    bin_ = scenario.regions["left_bin"]
+    spot = bench.robot.X_WG(reach.at(0.6 * reach.duration)[0]).translation
+    shifted = replace(bin_, X_WR=SE3(bin_.X_WR.rotation, spot + np.array([0.0, bin_.size[1] / 2, 0.0])))
+    scene = replace(bench.scene, scenario=replace(scenario, regions={**scenario.regions, "left_bin": shifted}))
+    assert not _is_free(bench, scene, first)
+    found = bench.skills["pick"].refine(PICK, scene, np.random.default_rng(0), Budget(), Hints(first=(first.sample,)))
+    assert not isinstance(found, Refinement) or _is_free(bench, scene, found)
+
+
+def test_an_object_that_lies_elsewhere_gets_a_way_of_its_own(bench):
+    first, _ = _pick(bench, bench.scene)
+    other = Bench(with_pose(scene_with("box", "carrot"), "box", 0.66, 0.1)).scene
+    again, _ = _pick(bench, replace(bench.scene, poses=other.poses), first.sample)
+    grasp = bench.robot.X_WG(again.phases[1].trajectory.end)
+    np.testing.assert_allclose(grasp.homogeneous, (other.poses["box"] * first.sample.X_OG).homogeneous, atol=1e-6)

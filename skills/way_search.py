@@ -1,0 +1,109 @@
+"""Finds ways of the hand, and how the free motion passes into the line after it."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from pinocchio import SE3
+
+from planner.failure import MotionFailure
+from planner.motion.passing import passing
+from planner.motion.timing import haste
+from planner.motion.trajectory import Trajectory
+from planner.refinement import Pair
+from sim.scene import SceneState
+from skills.carrying import MAX_ACCELERATION, acceleration, carried
+from skills.skill import Toolkit, Unfit
+from skills.ways import Legs, Line, Way
+
+MAX_PATHS = 4
+"""Joint paths (arm branches) of one sample that are tried, best first."""
+
+AMPLE = 0.2
+"""Rad from every joint limit beyond which a path is as good as any other."""
+
+OVERLAPS = (0.4, 0.2)
+"""Seconds before the end of a free motion at which the line after it begins, the first that is free."""
+
+MOST_OVERLAP = 1 / 3
+"""Of either motion's duration."""
+
+LEAST_OVERLAP = 0.05
+"""Seconds below which it isn't worth while."""
+
+
+def paths_through(toolkit: Toolkit, waypoints: Sequence[SE3], scene: SceneState) -> list[list[np.ndarray]]:
+    """Joint paths through poses X_WG of the hand, cut at them into legs (n,7), best first.
+
+    Those clear of the joint limits come first, among them those that begin near the arm and near
+    its start posture: changes of posture on the way would tumble what is held.
+    """
+    robot, home = toolkit.robot, scene.scenario.robot.q0
+
+    def rank(legs: list[np.ndarray]) -> tuple[bool, float]:
+        path = np.concatenate(legs)
+        margin = float(np.minimum(path - robot.q_min, robot.q_max - path).min())
+        from_here, from_home = (float(np.max(np.abs(path[0] - q) / robot.v_max)) for q in (scene.q, home))
+        return margin < AMPLE, from_here + from_home
+
+    return sorted(toolkit.motion.legs(waypoints, home), key=rank)[:MAX_PATHS]
+
+
+def find_way(
+    toolkit: Toolkit,
+    waypoints: Sequence[SE3],
+    scene: SceneState,
+    lines_of: Callable[[Legs], Sequence[Line]],
+    allowed: frozenset[Pair] = frozenset(),
+) -> Way | MotionFailure | Unfit:
+    """The first joint path through poses X_WG all of whose lines, and the free motion from scene.q, are free; one that
+    is known already comes first.
+
+    `allowed` pairs may touch during the free motion, which is as slow as what is held asks for. Every line is
+    confirmed by the exact model as timed.
+    """
+    motion, known = toolkit.motion, toolkit.known
+    again = known.find(motion, waypoints, scene, lines_of, allowed)
+    if again is not None:
+        return again
+    failure: MotionFailure | None = None
+    for legs in paths_through(toolkit, waypoints, scene):
+        lines = lines_of(legs)
+        checks = (motion.line_is_free(line.scene, line.path[: line.checked], line.allowed) for line in lines)
+        failure = next((check for check in checks if check is not None), None)
+        if failure:
+            continue
+        reach = motion.move(scene, [legs[0][0]], allowed)
+        if isinstance(reach, MotionFailure):
+            failure = reach
+            continue
+        timed = [motion.timed_line(line.scene, line.path, line.speed, line.allowed, line.checked) for line in lines]
+        failure = next((line for line in timed if isinstance(line, MotionFailure)), None)
+        if failure is None:
+            reach = carried(toolkit.robot, reach, scene.held)
+            done = [line for line in timed if isinstance(line, Trajectory)]
+            for k, line in enumerate(lines):
+                if line.is_entry:
+                    reach, done[k] = entered(toolkit, reach, line, done[k], allowed)
+            way = Way(tuple(waypoints), scene, allowed, tuple(legs), tuple(lines), reach, tuple(done))
+            known.keep(way)
+            return way
+    return failure or Unfit("the arm can't follow the hand's path")
+
+
+def entered(
+    toolkit: Toolkit, reach: Trajectory, line: Line, timed: Trajectory, allowed: frozenset[Pair]
+) -> tuple[Trajectory, Trajectory]:
+    """The free motion and the line after it, without a stop between them if there is room to cut the corner: while
+    the free motion lasts nothing but its own `allowed` pairs touch."""
+    robot, motion = toolkit.robot, toolkit.motion
+    longest = MOST_OVERLAP * min(reach.duration, timed.duration)
+    for overlap in dict.fromkeys(min(seconds, longest) for seconds in OVERLAPS):
+        if overlap < LEAST_OVERLAP:
+            break
+        head, entry = passing(reach, timed, overlap)
+        if haste(entry, robot) > 1.0 or acceleration(robot, entry, line.scene.held) > MAX_ACCELERATION:
+            continue
+        corner = entry.until(overlap)
+        if motion.audit(line.scene, corner, allowed) is None and motion.audit(line.scene, entry, line.allowed) is None:
+            return head, entry
+    return reach, timed
