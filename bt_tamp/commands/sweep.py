@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bt_tamp.commands.choices import add_disturbances, add_planning, add_time_limit, options_of
+from bt_tamp.commands.choices import add_disturbances, add_planning, add_time_limit, check_start, options_of
 from bt_tamp.commands.stopping import stop_on_signals
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def _jobs(arguments: argparse.Namespace) -> "list[Job]":
     befalling = [(), *((name,) for name in options.disturb)]
     digests = {}
     for scene in arguments.scenes:
-        load_scenario(scene)
+        check_start(load_scenario(scene), scene)
         digests[scene] = sha256(scenario_path(scene).read_bytes()).hexdigest()[:16]
     return [
         Job(scene, replace(options, seed=seed, disturb=disturb), digests[scene])

@@ -79,6 +79,7 @@ REFUSED = [
     (["explain", "nowhere"], "nowhere"),
     (["explain", "old"], "events.jsonl"),
     (["sweep", "fig0", "--store", "s.db"], "unknown scene"),
+    (["sweep", "low.yaml", "--store", "s.db"], "low.yaml, robot.q0_deg: the arm starts in collision ("),
     (["sweep", "small.yaml", "--seeds", "3:1", "--store", "s.db"], "3:1"),
     (["sweep", "small.yaml", "--seeds", "a:b", "--store", "s.db"], "a:b"),
     (["sweep", "small.yaml", "--jobs", "0", "--store", "s.db"], "--jobs"),
