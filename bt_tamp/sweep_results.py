@@ -9,7 +9,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from bt_tamp.disturb.names import CLASSES
+from bt_tamp.disturb.names import CLASSES, can_be_reached, chosen
 from bt_tamp.report.result import RunResult
 from bt_tamp.sweep_store import Stored
 
@@ -43,7 +43,7 @@ class Run:
     @property
     def is_reachable(self) -> bool:
         """Can the goal still be reached, by what was declared before the run?"""
-        return self.disturb == UNDISTURBED or all(CLASSES[name].is_reachable for name in self.disturb.split(","))
+        return can_be_reached(chosen(self.disturb))
 
     @property
     def is_met(self) -> bool:

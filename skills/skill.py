@@ -5,7 +5,7 @@ behaviour tree that carries it out (`subtree`). One primitive, one file.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -189,8 +189,3 @@ def _needed(suspects: frozenset[str], sample: Any, scene: SceneState, attempt: A
         if isinstance(attempt(sample, scene.without(suspects - {name})), tuple):
             suspects = suspects - {name}
     return suspects
-
-
-def with_hand(scene: SceneState, q: np.ndarray, phase: Phase) -> SceneState:
-    """The scene as it is while a phase runs: arm at q, hand as the phase has it."""
-    return replace(scene, q=q, opening=phase.opening, held=phase.held)

@@ -188,8 +188,3 @@ Draw = Callable[[Occasion], Deed | None]
 
 def _held_pose(scene: SceneState) -> dict[str, SE3]:
     return {} if scene.held is None else {scene.held.name: scene.poses[scene.held.name]}
-
-
-def in_words(name: str) -> str:
-    """A body's or region's name as it stands in a sentence."""
-    return name.replace("_", " ")

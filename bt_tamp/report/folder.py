@@ -74,10 +74,6 @@ class RunFolder:
         """Where the folder lies (it exists from now on)."""
         return self.open()
 
-    @property
-    def is_open(self) -> bool:
-        return self._path is not None
-
     def open(self) -> Path:
         """Make the folder and its subfolders, clear an older run if forced. Raises FolderError."""
         if self._path is not None:

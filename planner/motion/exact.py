@@ -152,10 +152,6 @@ class ExactChecker:
         """Is the straight edge from qa to qb free, at JOINT_STEP and TRAVEL_STEP?"""
         return self._within_limits(qb) and not self.contacts(self.densified(np.stack([qa, qb])), _any)
 
-    def colliding_pairs(self, q: np.ndarray) -> frozenset[Pair]:
-        """Names of the robot's parts (or the held body) and what they hit at q (7,), or hit among each other."""
-        return frozenset(contact.pair for contact in self.contacts(q[None]))
-
     def contacts(self, q: np.ndarray, enough: Callable[[Pair], bool] = _none) -> list[Contact]:
         """What comes nearer than its margin at the configurations q (n,7): for each pair the first one, closest part.
 

@@ -91,11 +91,6 @@ class Trajectory:
         q, v, _ = self.at(t)
         return Trajectory(np.append(since[early], t), np.vstack([self.q[early], q]), np.vstack([self.v[early], v]))
 
-    def sampled(self, step: float) -> np.ndarray:
-        """Configurations (k,7) every `step` seconds, both ends included."""
-        count = max(2, int(np.ceil(self.duration / step)) + 1)
-        return np.array([self.at(t)[0] for t in np.linspace(0.0, self.duration, count)])
-
 
 @njit(cache=True)
 def _evaluate(times: np.ndarray, coefficients: np.ndarray, q: np.ndarray, t: float, now: np.ndarray) -> None:

@@ -11,7 +11,6 @@ from numba import njit
 from planner.motion.trajectory import Trajectory
 from sim.plant import Observation
 from sim.robot import RobotModel
-from sim.wrench import Wrench
 from skills.control.bridge import Bridge
 from skills.control.contact import ContactWrench, Touch, along
 from skills.control.cushion import cushion
@@ -191,11 +190,6 @@ class ArmController:
     def is_still(self) -> bool:
         """Is the arm at rest?"""
         return self._state is not None and float(np.abs(self._state.v).max()) < AT_REST
-
-    @property
-    def contact_wrench(self) -> Wrench:
-        """Smoothed wrench that the world exerts on the tool, about G, in W axes."""
-        return Wrench(self._wrench.smooth[:3].copy(), self._wrench.smooth[3:].copy())
 
     @property
     def tracking_error(self) -> TrackingError:

@@ -136,14 +136,6 @@ def pose_error(target: Target, state: ArmState) -> np.ndarray:
     return error
 
 
-def null_direction(J: np.ndarray) -> np.ndarray:
-    """The joint velocity (7,) that doesn't move the tool: the generalised cross product of J's (6,7)
-    rows. It varies smoothly with J and vanishes where the tool loses a freedom."""
-    n = np.empty(7)
-    _fill_null_direction(J, n)
-    return n
-
-
 _EYE = np.eye(7)
 
 
@@ -229,6 +221,8 @@ def _posture_row(
 
 @njit(cache=True)
 def _fill_null_direction(J: np.ndarray, n: np.ndarray) -> None:
+    """The joint velocity n (7,) that doesn't move the tool, the generalised cross product of J's (6,7) rows. It varies
+    smoothly with J and vanishes where the tool loses a freedom."""
     block = np.empty((6, 6))
     for left_out in range(7):
         for i in range(6):

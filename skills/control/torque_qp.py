@@ -39,10 +39,6 @@ class Solution(NamedTuple):
     a: np.ndarray
     status: str
 
-    @property
-    def is_fallback(self) -> bool:
-        return self.status != SOLVED
-
 
 def nobody(part: str) -> None:
     """Takes no times."""
@@ -114,12 +110,6 @@ class TorqueQP:
             self.torque_limit_violations += 1
         self._last, self._last_feedforward = a, feedforward
         return Solution(tau, a, status)
-
-    @property
-    def joint_bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds (7,) on q̈ at the last tick; lower never exceeds upper."""
-        lower, upper = self._joint_bounds
-        return lower.copy(), upper.copy()
 
     def _fall_back(self, state: ArmState, status: str) -> Solution:
         self.fallbacks += 1

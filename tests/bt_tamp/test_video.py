@@ -42,7 +42,7 @@ def signals_of(scenario, path, seconds: float, contact_from: float = 0.3, contac
         q = scenario.robot.q0
         poses = MappingProxyType({name: body.X_WO for name, body in scenario.bodies.items()})
         speeds = {name: np.zeros(6) for name in scenario.bodies}
-        seen = Observation(float(t), q, 0 * q, 0 * q, 0.05, 0.0, 0.0, Wrench.zero(), poses, speeds)
+        seen = Observation(float(t), q, 0 * q, 0 * q, 0.05, 0.0, 0.0, Wrench(np.zeros(3), np.zeros(3)), poses, speeds)
         touching = contact_from <= t < contact_until
         p_WG = np.array([0.5 + 0.5 * (t - contact_from), 0.0, 0.1]) if touching else None
         table.add(seen, Reference(q, p_WG, 10.0 if touching else 0.0), 10.0 if touching else 0.0)

@@ -96,7 +96,8 @@ def test_the_fingertips_press_on_the_object_and_above_the_table_all_the_way(book
     for point in tip_points(press_pose(body, X_WO, way, pull.tips), book.robot.gripper):
         assert np.all(np.abs(X_WO.actInv(point))[:2] < np.array(body.shape.size)[:2] / 2)
     path = next(phase for phase in found.phases if phase.kind == "slide").trajectory
-    for q in path.sampled(0.2):
+    for t in np.linspace(0.0, path.duration, 30):
+        q = path.at(t)[0]
         assert all(
             margin_inside(table, p) > EDGE_MARGIN - 1e-3 for p in tip_points(book.robot.X_WG(q), book.robot.gripper)
         )

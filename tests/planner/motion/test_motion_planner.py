@@ -35,7 +35,10 @@ def _mirrored(q: np.ndarray) -> np.ndarray:
 
 def _clearance(robot, scene: SceneState, trajectory: Trajectory, margin: float) -> set[frozenset[str]]:
     checker = ExactChecker(robot, scene, Margins(margin))
-    return {contact.pair for contact in checker.contacts(checker.densified(trajectory.sampled(0.005)))}
+    path = np.array(
+        [trajectory.at(t)[0] for t in np.linspace(0.0, trajectory.duration, int(trajectory.duration / 0.005))]
+    )
+    return {contact.pair for contact in checker.contacts(checker.densified(path))}
 
 
 @pytest.mark.parametrize("place", [(0.6, 0.25, 0.15), (0.73, -0.08, 0.3), (0.05, 0.62, -0.08), (0.05, -0.62, -0.05)])

@@ -122,7 +122,8 @@ def stroke(robot, down) -> np.ndarray:
 
 def test_a_line_is_followed_at_the_asked_speed_of_the_hand(robot, stroke):
     trajectory = time_line(robot, stroke, 0.1, 0.5)
-    positions = np.array([robot.X_WG(q).translation for q in trajectory.sampled(0.02)])
+    times = np.linspace(0.0, trajectory.duration, int(trajectory.duration / 0.02))
+    positions = np.array([robot.X_WG(trajectory.at(t)[0]).translation for t in times])
     assert np.abs(positions[:, 0] - 0.6).max() < 1e-4
     assert np.abs(positions[:, 2] - 0.1).max() < 1e-4
     step = trajectory.duration / (len(positions) - 1)

@@ -46,7 +46,7 @@ def test_weight_and_inertia_of_hand_and_load_are_taken_off(robot):
         q, v, a = rng.uniform(-1.0, 1.0, (3, 7))
         contact = ContactWrench(robot, PERIOD)
         contact.carry(load)
-        contact.update(Dynamics(robot).state(q, v - a * PERIOD), Wrench.zero())
+        contact.update(Dynamics(robot).state(q, v - a * PERIOD), Wrench(np.zeros(3), np.zeros(3)))
         contact.update(Dynamics(robot).state(q, v), sensed(robot, q, v, a, load, push))
         np.testing.assert_allclose(contact.raw, push, atol=1e-9)
 
@@ -132,7 +132,7 @@ def test_a_smooth_step_is_level_at_both_ends():
 def test_fingers_driven_against_their_stops_are_not_felt_as_contact(lab, speed):
     rig = lab.rig(lab.home, grip=GripCommand(speed, 80.0))
     rig.run(1.2)
-    assert np.linalg.norm(rig.controller.contact_wrench.force) < 0.2
+    assert rig.controller.felt < 0.2
 
 
 def test_swinging_through_the_air_is_not_felt_as_contact(lab):

@@ -45,7 +45,7 @@ def test_the_approach_is_limited_and_the_arm_does_not_stop_for_it(robot):
     kept = TorqueQP(robot, PERIOD).solve(state, [HybridTask(dive, sideways)], STILL, (limit,))
     assert (state.J @ free.a + state.drift)[2] < -20.0
     assert (state.J @ kept.a + state.drift)[2] == pytest.approx(-0.05 / 0.01, abs=0.01)
-    assert not kept.is_fallback
+    assert kept.status == "solved"
 
 
 def test_away_from_the_surface_nothing_is_limited(robot):

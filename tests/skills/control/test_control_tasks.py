@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from skills.control.dynamics import Dynamics
 from skills.control.state import Target
-from skills.control.tasks import PoseTask, PostureTask, null_direction, pose_error
+from skills.control.tasks import PoseTask, PostureTask, pose_error
 
 STILL = np.zeros(7)
 angles = st.lists(st.floats(-1.5, 1.5), min_size=7, max_size=7).map(np.array)
@@ -29,17 +29,11 @@ def test_the_pose_error_is_the_rotation_that_leads_to_the_target(robot, turn):
 
 @settings(max_examples=50, derandomize=True, deadline=None)
 @given(q=angles)
-def test_motion_along_the_null_direction_leaves_the_tool_where_it_is(robot, q):
-    state = state_at(robot, q)
-    assert np.abs(state.J @ null_direction(state.J)).max() < 1e-12
-
-
-@settings(max_examples=30, derandomize=True, deadline=None)
-@given(q=angles)
 def test_a_force_at_the_tool_does_no_work_on_the_posture(robot, q):
     state = state_at(robot, q)
     row = PostureTask(q, STILL, STILL).rows(state).A[0]
     answer = np.linalg.solve(state.M, state.J.T)
+    assert np.linalg.norm(row) > 0.99 or np.linalg.svd(state.J)[1].min() < 0.01
     assert np.abs(row @ answer).max() < 1e-8 * np.abs(answer).max()
 
 
