@@ -6,7 +6,8 @@ import pytest
 from planner.motion.trajectory import Trajectory
 from sim.disturbance import DisturbedPlant
 from sim.plant import Command
-from sim.sensor_faults import ForceDelay, ForceFrozen, ForceMissing, ForceNoise
+from sim.robot_faults import Push
+from sim.sensor_faults import ForceDelay, ForceFrozen, ForceMissing, ForceNoise, JointDelay
 from skills.control.controller import ArmController
 from skills.control.dynamics import Dynamics
 from skills.control.limits import FREE, ApproachLimit, Block
@@ -157,6 +158,23 @@ def test_a_push_on_the_hand_neither_flings_the_arm_about_nor_drives_a_joint_onto
     assert isinstance(rig.controller.stopped, ForceTooHigh)
     assert (rig.robot.q_max - np.abs(pushed)).min() > 0.05
     assert np.abs(pushed[-1] - start).max() < 0.3
+
+
+@pytest.mark.parametrize("posture", range(3))
+@pytest.mark.parametrize("force", [(-100.0, 0.0, 0.0), (0.0, 100.0, 0.0)])
+def test_an_arm_that_gives_way_comes_to_rest_though_its_joints_states_come_10_ms_late(lab, posture, force):
+    rig = lab.rig(lab.postures[posture])
+    rig.plant = DisturbedPlant(rig.plant, [JointDelay(0.01), Push(force, start=0.3, end=0.4)])
+
+    def look(_):
+        return np.abs(rig.plant.truth().v / rig.robot.v_max).max(), rig.controller.felt
+
+    speeds, felt = np.array(rig.run(1.3, look)).T
+    assert isinstance(rig.controller.stopped, ForceTooHigh)
+    assert speeds.max() < 6.0
+    assert felt.max() < 500.0
+    assert speeds[-100:].max() < 0.15
+    assert felt[-100:].max() < 5.0
 
 
 def test_ordinary_work_on_an_arm_with_friction_and_wrong_masses_is_no_collision(lab):
