@@ -1,7 +1,9 @@
 """What skills ask about motion: inverse kinematics, straight lines, collision-free moves, and their timing."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -195,10 +197,15 @@ class MotionPlanner:
         seed, ends = self._next_seed(), self.ends(scene, q_goals, allowed)
         if isinstance(ends, MotionFailure):
             return ends
+        walled_in = cache(lambda: self._walled_in(scene.without(movables(scene)), ends, seed))
+
+        def hopeless() -> bool:
+            return walled_in() is not None or self._enclosed(scene, ends, seed) is not None
+
         for attempt in range(_ATTEMPTS):
-            path = self._polyline(scene, ends, seed + attempt, max_checks)
+            path = self._polyline(scene, ends, seed + attempt, max_checks, hopeless)
             if path is None:
-                return self._blocked(scene, ends, seed, max_checks)
+                return walled_in() or self._blocked(scene, ends, seed, max_checks)
             trajectory = self._timed(scene, path, ends.margins)
             if trajectory is not None:
                 return trajectory
@@ -215,7 +222,7 @@ class MotionPlanner:
         seed, ends = self._next_seed(), self.ends(scene, q_goals, allowed)
         if isinstance(ends, MotionFailure):
             return ends
-        path = self._polyline(scene, ends, seed, max_checks)
+        path = self._polyline(scene, ends, seed, max_checks, lambda: self._enclosed(scene, ends, seed) is not None)
         return MotionFailure(f"no path within {max_checks} checks") if path is None else path
 
     def ends(
@@ -253,13 +260,15 @@ class MotionPlanner:
         failures = [blame("the goal is in collision:", contacts, movables(scene)) for contacts in hits]
         return min(failures, key=lambda failure: len(failure.culprits) or np.inf)
 
-    def _polyline(self, scene: SceneState, ends: Ends, seed: int, max_checks: int) -> np.ndarray | None:
+    def _polyline(
+        self, scene: SceneState, ends: Ends, seed: int, max_checks: int, is_hopeless: Callable[[], bool] | None = None
+    ) -> np.ndarray | None:
         checker, reached = self._checker(scene, ends)
         before = checker.checks
         path = next((np.stack([scene.q, q]) for q in reached if checker.edge_is_free(scene.q, q)), None)
         if path is None:
             query = Query(scene.q, reached, self._limits, seed, max_checks)
-            path = plan_path(query, checker, self._path_settings, lambda: enclosed_end(checker, query) is not None)
+            path = plan_path(query, checker, self._path_settings, is_hopeless)
             if path is not None:
                 path = shortened(path, checker, np.random.default_rng(seed))
         self.work.add("checks" if isinstance(checker, FastChecker) else "exact_checks", checker.checks - before)
@@ -277,11 +286,7 @@ class MotionPlanner:
         """Who is in the way, once no path was found: a motion after all if the way without the movables hits none."""
         reason = f"no path within {max_checks} checks"
         movable = movables(scene)
-        bare = scene.without(movable)
-        walled = self._walled_in(bare, ends, seed)
-        if walled is not None:
-            return walled
-        path = self._polyline(bare, ends, seed, max_checks) if movable else None
+        path = self._polyline(scene.without(movable), ends, seed, max_checks) if movable else None
         if path is None:
             return MotionFailure(f"{reason}, whatever is moved aside")
         contacts = self._contacts(scene, path, ends.margins)
@@ -291,16 +296,22 @@ class MotionPlanner:
 
     def _walled_in(self, scene: SceneState, ends: Ends, seed: int) -> MotionFailure | None:
         """What there is no way out of, at the start or at every goal."""
-        checker, reached = self._checker(scene, ends)
-        before, query = checker.checks, Query(scene.q, reached, self._limits, seed, 0)
-        end = enclosed_end(checker, query)
-        self.work.add("checks", checker.checks - before)
+        end = self._enclosed(scene, ends, seed)
         if end is None:
             return None
         which, q = end
         self.work.add("exact_checks", LOOKS)
-        walls = walls_about(self._exact(scene, ends.margins), q, query)
+        walls = walls_about(self._exact(scene, ends.margins), q, self._limits, seed)
         return MotionFailure(f"the {which} is walled in by {', '.join(walls) or 'the arm itself'}")
+
+    def _enclosed(self, scene: SceneState, ends: Ends, seed: int) -> tuple[str, np.ndarray] | None:
+        """See `enclosed_end`."""
+        checker, reached = self._checker(scene, ends)
+        # A copy, because whoever searches with this model counts its checks.
+        own, before = copy(checker), checker.checks
+        end = enclosed_end(own, Query(scene.q, reached, self._limits, seed, 0))
+        self.work.add("checks", own.checks - before)
+        return end
 
     def _timed(self, scene: SceneState, path: np.ndarray, margins: Margins) -> Trajectory | None:
         margins = replace(margins, free=self.settings.audit_margin)

@@ -56,6 +56,13 @@ def test_with_one_goal_outside_nothing_is_enclosed(robot, caged):
     assert enclosed_end(FastChecker(robot, caged), both) is None
 
 
+@pytest.mark.parametrize("wall", ["wall0", "wall1", "wall2"])
+def test_three_walls_enclose_nobody_whatever_chance_draws(robot, caged, wall):
+    scene = caged.without(frozenset({wall}))
+    for seed in range(10):
+        assert enclosed_end(FastChecker(robot, scene), replace(_query(robot, scene), seed=seed)) is None
+
+
 def test_an_open_table_encloses_nobody(robot, scene):
     assert enclosed_end(FastChecker(robot, scene), _query(robot, scene)) is None
 
