@@ -34,7 +34,7 @@ def plan_compiled(checker: FastChecker, query: Query, step: float) -> CompiledPa
     path = _plan(*ends, checker.packed, np.array(query.limits), step, rng)
     if not len(path):
         return None
-    return CompiledPath(path, shorten(path, rng.uniform(size=(TRIES, 2)), checker.packed)[0])
+    return CompiledPath(path, shorten(path, rng.uniform(size=(TRIES, 3)), checker.packed)[0])
 
 
 @njit(cache=True)

@@ -18,7 +18,7 @@ from planner.motion.exact import Contact, ExactChecker
 from planner.motion.ik import ClosedFormIK
 from planner.motion.ik_numeric import track_numerically
 from planner.motion.lines import CartesianPath, interpolate, track
-from planner.motion.ompl_ import PathSettings, Query, plan_path
+from planner.motion.ompl_ import PathSettings, Query, path_length, plan_path
 from planner.motion.shortcut import shortened
 from planner.motion.timing import time_line, time_path, time_path_with_stops
 from planner.motion.trajectory import Trajectory
@@ -34,6 +34,9 @@ SLACK = 0.0005
 
 DEEPEST = -0.004
 """Distance in metres (negative: overlap) at which the arm may still start: things held or pressed give way a little."""
+
+FAR_ABOUT = 1.2
+"""Times the straight way: where a path is longer, another is sought, and the shorter one taken."""
 
 _CONTROL_SPACINGS = (0.3, 0.1)
 _ATTEMPTS = 3
@@ -268,11 +271,21 @@ class MotionPlanner:
         path = next((np.stack([scene.q, q]) for q in reached if checker.edge_is_free(scene.q, q)), None)
         if path is None:
             query = Query(scene.q, reached, self._limits, seed, max_checks)
-            path = plan_path(query, checker, self._path_settings, is_hopeless)
-            if path is not None:
-                path = shortened(path, checker, np.random.default_rng(seed))
+            path = self._shortened(query, checker, is_hopeless)
+            if path is not None and path_length(path) > FAR_ABOUT * np.linalg.norm(path[-1] - path[0]):
+                restarts = self._path_settings.restarts
+                again = replace(query, seed=seed + restarts, max_checks=max_checks // restarts)
+                other = self._shortened(again, checker)
+                path = path if other is None else min(path, other, key=path_length)
         self.work.add("checks" if isinstance(checker, FastChecker) else "exact_checks", checker.checks - before)
         return path
+
+    def _shortened(
+        self, query: Query, checker: CollisionChecker, is_hopeless: Callable[[], bool] | None = None
+    ) -> np.ndarray | None:
+        """A path, made shorter."""
+        path = plan_path(query, checker, self._path_settings, is_hopeless)
+        return None if path is None else shortened(path, checker, np.random.default_rng(query.seed))
 
     def _checker(self, scene: SceneState, ends: Ends) -> tuple[CollisionChecker, list[np.ndarray]]:
         """The fast model with the goals it accepts; the exact one if the fast refuses the start or every goal."""

@@ -76,15 +76,16 @@ def plan_path(
         if run > 0 and not found and is_hopeless is not None and is_hopeless():
             break
         path = _search(query, checker, settings, query.seed + run, query.max_checks // settings.restarts)
+        if path is not None and settings.planner != "best-of-n-RRT":
+            return path
         found += [] if path is None else [path]
-        if found and settings.planner != "best-of-n-RRT":
-            break
     return min(found, key=path_length, default=None)
 
 
 def path_length(path: np.ndarray) -> float:
     """Length in rad of a polyline (n,7), Euclidean over the joints."""
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    steps = path[1:] - path[:-1]
+    return float(np.sqrt((steps * steps).sum(axis=1)).sum())
 
 
 class _Edges(base.MotionValidator):

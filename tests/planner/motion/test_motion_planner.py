@@ -6,6 +6,7 @@ import pytest
 from planner.failure import MotionFailure
 from planner.motion.exact import ExactChecker
 from planner.motion.motion_planner import MotionPlanner, MotionSettings
+from planner.motion.ompl_ import path_length
 from planner.motion.trajectory import Trajectory
 from planner.motion.world import Margins
 from planner.refinement import Work, pairs
@@ -122,6 +123,13 @@ def test_with_a_budget_the_way_around_the_same_wall_is_found(robot, table, at, p
     trajectory = planner.move(start, [_mirrored(start.q)])
     assert isinstance(trajectory, Trajectory)
     assert _clearance(robot, walled, trajectory, 0.0005) == set()
+
+
+def test_whatever_chance_draws_a_way_over_a_wall_leads_not_far_about(robot, table, at, planner, down):
+    scene = SceneState.initial(table([("wall", Box((0.4, 0.02, 0.5)), at(0.6, 0.05, 0.3))]), 0.06)
+    start, end = (next(q for q in planner.ik(down(0.6, y, 0.12)) if planner.free(scene, q)) for y in (0.25, -0.2))
+    ways = [MotionPlanner(robot, seed).way(replace(scene, q=start), [end]) for seed in range(20)]
+    assert max(path_length(way) for way in ways) < 1.3 * np.linalg.norm(end - start)
 
 
 def test_a_fixed_obstacle_in_the_only_way_is_nobody_s_fault(scene, planner, goal):

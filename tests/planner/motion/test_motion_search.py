@@ -8,7 +8,7 @@ from planner.motion.collision import FastChecker
 from planner.motion.exact import ExactChecker
 from planner.motion.ik import ClosedFormIK
 from planner.motion.ompl_ import PLANNERS, PathSettings, Query, path_length, plan_path
-from planner.motion.shortcut import shortened
+from planner.motion.shortcut import GOOD, TRIES, shortened
 
 
 @pytest.fixture(scope="module")
@@ -94,14 +94,27 @@ def test_a_search_ends_with_its_budget_of_checks(name, checker, query):
     assert checker.checks < 60 + 3 * 250
 
 
-def test_shortcuts_keep_ends_and_freedom_and_make_the_path_shorter(robot, scene, checker, query):
-    path = plan_path(query, checker, PathSettings("RRT"))
+@pytest.mark.parametrize("seed", range(5))
+def test_shortcuts_keep_ends_and_freedom_and_make_the_path_shorter(robot, scene, checker, query, seed):
+    path = plan_path(replace(query, seed=seed), checker, PathSettings("RRT"))
     assert path is not None
-    short = shortened(path, checker, np.random.default_rng(0))
+    short = shortened(path, checker, np.random.default_rng(seed))
     assert np.array_equal(short[0], path[0])
     assert np.array_equal(short[-1], path[-1])
     assert path_length(short) < path_length(path)
     assert _is_free(short, robot, scene)
+
+
+def test_corners_are_cut_until_the_path_is_hardly_longer_than_the_straight_way(checker, query):
+    straight = path_length(np.stack([query.start, query.goals[0]]))
+    paths = [plan_path(replace(query, seed=seed), checker, PathSettings()) for seed in range(12)]
+    short = [path_length(shortened(path, checker, np.random.default_rng(0))) / straight for path in paths]
+    assert sorted(short)[-3] <= GOOD
+    spent = checker.checks
+    shortened(paths[0], checker, np.random.default_rng(0))
+    few, spent = checker.checks - spent, checker.checks
+    shortened(paths[0], checker, np.random.default_rng(0), tries=4 * TRIES)
+    assert checker.checks - spent == few
 
 
 def test_the_exact_model_s_path_is_left_its_corners_but_no_detour(robot, scene):
