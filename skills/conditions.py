@@ -6,10 +6,11 @@ import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from planner.failure import EffectMissing, GraspSlipped
+from planner.failure import EffectMissing, GraspSlipped, SceneChanged
 from planner.task.facts import place_of
 from sim.scene import Held, SceneState, pose_distance
 from skills.context import ActionRun, SkillContext
+from skills.watching import Load
 
 SLIP_DISTANCE = 0.02
 SLIP_ANGLE = np.radians(20.0)
@@ -47,6 +48,36 @@ class HandHolds(Behaviour):
         self._context.fail(GraspSlipped(self._run.action, reason, sample))
         self.feedback_message = reason
         self._grip = None
+        return Status.FAILURE
+
+
+class Unladen(Behaviour):
+    """Has nothing come to stand on it since the guard began to look? If so, the fingers let go of it."""
+
+    def __init__(self, name: str, run: ActionRun, context: SkillContext) -> None:
+        super().__init__(f"nothing on {name}?")
+        self._name = name
+        self._run, self._context = run, context
+        self._load: Load | None = None
+
+    def terminate(self, new_status: Status) -> None:
+        if new_status == Status.INVALID:
+            self._load = None
+
+    def update(self) -> Status:
+        context = self._context
+        if not context.is_watchful:
+            return Status.SUCCESS
+        if self._load is None:
+            self._load = Load([self._name], context.scene)
+        come = self._load.come(context.scene)
+        if come is None:
+            return Status.SUCCESS
+        if context.phase is not None:
+            context.grip.open_to(context.phase.opening)
+        sample = self._run.refinement.sample if self._run.refinement else None
+        context.fail(SceneChanged(self._run.action, come, sample))
+        self.feedback_message = come
         return Status.FAILURE
 
 

@@ -15,7 +15,7 @@ from scenarios.scenario import Body
 from sim.robot import GRAVITY
 from sim.scene import Held, SceneState
 from skills.carrying import MAX_ACCELERATION
-from skills.conditions import Achieved, HandHolds
+from skills.conditions import Achieved, HandHolds, Unladen
 from skills.context import ActionRun, SkillContext
 from skills.motions import Close, Follow, guarded, sequence
 from skills.refine import Refine
@@ -79,7 +79,7 @@ class Pick:
         return sequence(
             str(run.action),
             guarded("reach", Refine(run, context, self._kit.motion), reach),
-            Close("close", run, context),
+            guarded("grasp", Unladen(name, run, context), Close("close", run, context)),
             guarded("hold", HandHolds(name, run, context), Follow("lift", run, context)),
             Weigh(run, context),
             Achieved(lambda scene: scene.held is not None and scene.held.name == name, run, context),

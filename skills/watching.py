@@ -1,6 +1,6 @@
 """Does what an action was refined for still hold? Its objects lie where they lay, and the rest of its path is free."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +9,7 @@ from pinocchio import SE3
 from planner.failure import MotionFailure
 from planner.motion.motion_planner import MotionPlanner
 from planner.refinement import Phase, Refinement
+from planner.support import burden
 from sim.scene import SceneState, pose_distance
 
 SHIFT = 0.008
@@ -31,9 +32,10 @@ class Watch:
         self._objects = [name for name in refinement.action.args if name in scene.poses and not _holds(scene, name)]
         self._regions = self._regions_looked_at = scene.scenario.regions
         self._places = [name for name in refinement.action.args if name in self._regions]
+        self._load = Load(self._objects, scene)
 
     def object_shifted(self, scene: SceneState) -> str | None:
-        """Which of the action's objects no longer lies where it was refined for, in a sentence."""
+        """Which of the action's objects no longer lies as it was refined for, in a sentence."""
         for name in self._objects:
             if name not in scene.poses:
                 return f"{name} is gone"
@@ -42,7 +44,7 @@ class Watch:
         for name in self._places:
             if scene.scenario.regions[name] is not self._regions[name]:
                 return f"{name} was moved"
-        return None
+        return self._load.come(scene)
 
     def path_blocked(self, scene: SceneState, phase: Phase, since: float) -> MotionFailure | None:
         """What is in the way of the rest of a phase, `since` seconds after its start, and of the moves after it.
@@ -50,13 +52,7 @@ class Watch:
         Looked for only when a body that the phase may not touch has moved.
         """
         may_touch = frozenset[str]().union(*phase.allowed)
-        stirred = [
-            name
-            for name, X_WO in scene.poses.items()
-            if name not in may_touch
-            and not _holds(scene, name)
-            and (name not in self._looked_at or _has_moved(self._looked_at[name], X_WO, STIR, STIR_TURN))
-        ]
+        stirred = [name for name in _stirred(self._looked_at, scene) if name not in may_touch]
         regions = scene.scenario.regions
         stirred += [
             name for name in regions if name not in may_touch and regions[name] is not self._regions_looked_at[name]
@@ -81,6 +77,34 @@ class Watch:
                 break
             found.append((one, 0.0))
         return found
+
+
+class Load:
+    """What stands on some bodies, compared with what stood on them in an earlier scene."""
+
+    def __init__(self, names: Sequence[str], scene: SceneState) -> None:
+        self._borne = {name: burden(scene, name) for name in names}
+        self._looked_at = scene.poses
+
+    def come(self, scene: SceneState) -> str | None:
+        """What has come to stand on one of them, in a sentence. Looked for only when something has moved."""
+        if not _stirred(self._looked_at, scene):
+            return None
+        for name, borne in self._borne.items():
+            more = burden(scene, name) - borne if name in scene.poses else ()
+            if more:
+                return f"{', '.join(sorted(more))} came to stand on {name}"
+        self._looked_at = scene.poses
+        return None
+
+
+def _stirred(before: Mapping[str, SE3], scene: SceneState) -> list[str]:
+    """What lies otherwise than before, or is new."""
+    return [
+        name
+        for name, X_WO in scene.poses.items()
+        if not _holds(scene, name) and (name not in before or _has_moved(before[name], X_WO, STIR, STIR_TURN))
+    ]
 
 
 def _holds(scene: SceneState, name: str) -> bool:

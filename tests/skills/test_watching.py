@@ -9,11 +9,11 @@ from pinocchio import SE3
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
-from planner.failure import SceneChanged
+from planner.failure import RefinementFailure, SceneChanged
 from planner.refinement import Budget, Hints, Refinement
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
-from scenarios.shapes import Box
+from scenarios.shapes import Box, extents
 from skills.context import ActionRun
 
 
@@ -41,6 +41,19 @@ def shifted(bench: Bench, name: str, x: float, y: float) -> Callable[[], None]:
     return lambda: bench.plant.put(name, SE3(X_WO.rotation, X_WO.translation + np.array([x, y, 0.0])))
 
 
+def put_on(bench: Bench, name: str, below: str) -> Callable[[], None]:
+    """Stand one body on the middle of another that lies flat, wherever that is by then."""
+
+    def height(body: str) -> float:
+        return float(extents(bench.scene.scenario.bodies[body].shape)[2])
+
+    def put() -> None:
+        p = bench.scene.poses[below].translation + np.array([0.0, 0.0, (height(below) + height(name)) / 2 + 5e-4])
+        bench.plant.put(name, SE3(np.eye(3), p))
+
+    return put
+
+
 def with_post(scenario: Scenario, height: float) -> Scenario:
     """The scenario with its box as a slim post, out of the way."""
     body = scenario.bodies["box"]
@@ -48,6 +61,13 @@ def with_post(scenario: Scenario, height: float) -> Scenario:
     X_WO = SE3(np.eye(3), np.array([0.7, 0.35, top + height / 2]))
     post = replace(body, shape=Box((0.06, 0.06, height)), X_WO=X_WO)
     return replace(scenario, bodies={**scenario.bodies, "box": post})
+
+
+def with_small_box(*names: str) -> Scenario:
+    """Some bodies of fig1, the box so small that it can stand on the sponge between the fingers."""
+    scenario = with_pose(scene_with(*names), "box", 0.7, 0.3)
+    body = replace(scenario.bodies["box"], shape=Box((0.05, 0.05, 0.07)), mass=0.15)
+    return replace(scenario, bodies={**scenario.bodies, "box": body})
 
 
 def events_of(bench: Bench) -> list[tuple[str, str]]:
@@ -65,6 +85,26 @@ def test_an_object_moved_while_the_hand_comes_for_it_is_picked_where_it_is_now()
     assert bench.scene.held is not None
     assert bench.scene.held.name == "box"
     assert [reason for kind, reason in told if kind == "refined_again"] == ["box was moved"]
+
+
+def test_what_is_put_on_an_object_while_the_hand_comes_for_it_has_to_go_first():
+    bench = Bench(with_small_box("box", "sponge"))
+    told = events_of(bench)
+    status = carried_out(bench, "pick(sponge, dustpan)", "pre-grasp", 0.5, put_on(bench, "box", "sponge"))
+    assert status is Status.FAILURE
+    assert isinstance(bench.context.failure, RefinementFailure)
+    assert bench.context.failure.culprit_sets == {frozenset({"box"})}
+    assert [reason for kind, reason in told if kind == "refined_again"] == ["box came to stand on sponge"]
+
+
+def test_what_is_put_on_an_object_while_the_fingers_close_is_not_lifted_with_it():
+    bench = Bench(with_small_box("box", "sponge"))
+    status = carried_out(bench, "pick(sponge, dustpan)", "close", 0.0, put_on(bench, "box", "sponge"))
+    assert status is Status.FAILURE
+    assert isinstance(bench.context.failure, SceneChanged)
+    assert bench.context.failure.reason == "box came to stand on sponge"
+    bench.run(300)
+    assert bench.scene.held is None
 
 
 def test_what_is_put_in_the_way_of_the_hand_is_gone_around_without_touching_it():
