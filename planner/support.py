@@ -1,5 +1,6 @@
 """What a body stands on, besides a surface: other bodies, and fixed things; and what stands on it."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -23,6 +24,11 @@ def supports(scene: SceneState, name: str) -> frozenset[str]:
 def burden(scene: SceneState, name: str) -> frozenset[str]:
     """Bodies that stand on a body, or on what stands on it."""
     return _burden(Standing(scene), name)
+
+
+def borne(scene: SceneState) -> frozenset[str]:
+    """Bodies that stand on what the hand holds, or on what stands on it: they come along with it."""
+    return frozenset() if scene.held is None else burden(replace(scene, held=None), scene.held.name)
 
 
 @lru_cache(maxsize=512)

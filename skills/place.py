@@ -11,6 +11,7 @@ from planner.grasps import open_width
 from planner.packing import clear_first, standing_about
 from planner.placements import Placement, Surface, placements, surface_of, top_of
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
+from planner.support import borne
 from planner.task.facts import place_of
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Region, Scenario, Table
@@ -69,7 +70,8 @@ hand is swung round, and it may be swung right round."""
 
 
 class Place:
-    """`place(object, place)`: a release pose found by sampling; straight down to it, open, straight back."""
+    """`place(object, place)`: a release pose found by sampling; straight down to it, open, straight back. What stands
+    on the object comes along."""
 
     name = "place"
     arity = 2
@@ -84,28 +86,39 @@ class Place:
         if scene.held is None or scene.held.name != name:
             return RefinementFailure(action, f"the hand does not hold {name}")
 
+        along = borne(scene)
+        coming_along = pairs(self._kit.robot.hand_links | {name}, along) if along else frozenset()
+
         def attempt(placement: Placement, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
-            return self._attempt(action, placement, world)
+            outcome = self._attempt(action, placement, world.without(along))
+            if not isinstance(outcome, tuple):
+                return outcome
+            return tuple(replace(phase, allowed=phase.allowed | coming_along) for phase in outcome)
 
         body = scene.scenario.bodies[name]
         too_large = wider_than(place_named(scene.scenario, goal), body.shape)
         if too_large is not None:
             return RefinementFailure(action, f"{name} {too_large} {goal}", proof="anywhere")
         holding = (self._kit.robot.X_WG(scene.q), scene.held.X_GO)
-        ways = [placements(body.shape, holding, surface, rng) for surface in surfaces(scene, goal)]
+        bare = scene.without(along)
+        ways = [placements(body.shape, holding, surface, rng) for surface in surfaces(bare, goal)]
         drawn = (sample for turn in zip_longest(*ways) for sample in turn if sample is not None)
 
         def has_room(placement: Placement) -> bool:
             X_WG = placement.X_WO * holding[1].inverse()
-            return hand_would_hit(self._kit, scene, X_WG, pairs(self._kit.robot.finger_links, name)) is None
+            return hand_would_hit(self._kit, bare, X_WG, pairs(self._kit.robot.finger_links, name)) is None
 
-        samples = clear_first(drawn, body, standing_about(scene), has_room)
+        samples = clear_first(drawn, body, standing_about(bare), has_room)
         nothing = f"{name}, as it is held, fits nowhere in {goal}"
         return refine_by_sampling(action, scene, samples, attempt, budget, hints, nothing)
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
         end = refinement.phases[-1]
-        placed = scene.moved(refinement.action.args[0], refinement.sample.X_WO_rest)
+        name, X_WO_rest = refinement.action.args[0], refinement.sample.X_WO_rest
+        placed = scene.moved(name, X_WO_rest)
+        carry = X_WO_rest * scene.poses[name].inverse()
+        for other in borne(scene):
+            placed = placed.moved(other, carry * scene.poses[other])
         return replace(placed, q=end.trajectory.end, held=None, opening=end.opening)
 
     def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:

@@ -15,6 +15,7 @@ from py_trees.behaviour import Behaviour
 from planner.failure import Blocked, MotionFailure, RefinementFailure
 from planner.motion.world import movables
 from planner.refinement import Budget, Hints, Pair, Phase, Refinement, pairs
+from planner.support import borne
 from planner.task.facts import place_of
 from planner.task.symbols import GroundAction
 from scenarios.regions import interior
@@ -167,6 +168,9 @@ class Wipe:
         held = scene.held
         assert held is not None
         stroke = wiping.stroke
+        on_it = borne(scene)
+        if on_it:
+            return Unfit(f"{', '.join(sorted(on_it))} would come along on {held.name}", on_it)
         if not place.taken(stroke, surely=False)[place.crumbs.names.index(action.args[0])]:
             return Unfit("the crumb does not lie before the stroke")
         if place.comes_down_on(stroke):

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import Protocol
 
-from planner.support import supports
+from planner.support import borne, supports
 from planner.task.layout import Layout, layout
 from planner.task.pddl import Domain
 from planner.task.primitives import AWAY, GRASPABLE, STUCK
@@ -46,7 +46,8 @@ def place_of(scene: SceneState, name: str) -> str | None:
 
     In a region: the centre inside its walls and below its rim. On the table: the centre above the
     plate and the lowest point near its top. Or on top of something on the table or in a dustpan (but for
-    crumbs: only what lies on the table itself can be wiped).
+    crumbs: only what lies on the table itself can be wiped). What stands on what the hand holds counts as on the
+    table: there it can be taken from once that is put down.
     """
     return _place_of(scene, name, layout(scene.scenario))
 
@@ -58,11 +59,11 @@ def _place_of(scene: SceneState, name: str, fixed: Layout) -> str | None:
     if place is not None or fixed.kinds[name] == "crumb":
         return place
     over = fixed.over(scene.poses[name])
-    if over is None:
-        return None
-    fixtures = scene.scenario.fixtures if over == TABLE else ()
-    stands = any(other in fixtures or _place_of(scene, other, fixed) == over for other in supports(scene, name))
-    return over if stands else None
+    if over is not None:
+        fixtures = scene.scenario.fixtures if over == TABLE else ()
+        if any(other in fixtures or _place_of(scene, other, fixed) == over for other in supports(scene, name)):
+            return over
+    return TABLE if name in borne(scene) else None
 
 
 def observed_facts(scene: SceneState) -> frozenset[Fact]:

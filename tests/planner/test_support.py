@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from pinocchio import SE3
 
-from planner.support import burden, supports
+from planner.support import borne, burden, supports
 from sim.scene import Held
 
 
@@ -33,3 +33,11 @@ def test_what_stands_beside_it_or_hangs_in_the_hand_is_none(tabletop):
     assert "pot" not in burden(scene, "cup")
     assert supports(scene, "pot") == frozenset()
     assert burden(replace(scene, held=Held("mug", at(0.0, 0.0, 0.0))), "cup") == frozenset()
+
+
+def test_what_stands_on_what_the_hand_holds_is_borne_with_it(tabletop):
+    scene = stacked(tabletop)
+    assert borne(scene) == frozenset()
+    held = replace(scene, held=Held("cup", at(0.0, 0.0, 0.0)))
+    assert borne(held) == {"mug", "jug"}
+    assert borne(replace(scene, held=Held("jug", at(0.0, 0.0, 0.0)))) == frozenset()

@@ -9,8 +9,9 @@ from pinocchio import SE3
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
-from planner.failure import RefinementFailure, SceneChanged
+from planner.failure import GraspMissed, RefinementFailure, SceneChanged
 from planner.refinement import Budget, Hints, Refinement
+from planner.support import supports
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, extents
@@ -105,6 +106,19 @@ def test_what_is_put_on_an_object_while_the_fingers_close_is_not_lifted_with_it(
     assert bench.context.failure.reason == "box came to stand on sponge"
     bench.run(300)
     assert bench.scene.held is None
+
+
+def test_what_was_lifted_with_an_object_can_be_taken_from_it_once_that_is_put_down():
+    bench = Bench(with_small_box("box", "carrot", "sponge"))
+    carried_out(bench, "pick(sponge, dustpan)", "lift", 0.0, put_on(bench, "box", "sponge"))
+    assert isinstance(bench.context.failure, GraspMissed)
+    assert place_of(bench.scene, "box") == "table"
+    wiped = bench.refine(action("wipe(carrot, table, dustpan)"))
+    assert isinstance(wiped, RefinementFailure)
+    assert wiped.culprit_sets == {frozenset({"box"})}
+    assert bench.do("place(sponge, table)") is Status.SUCCESS, bench.context.failure
+    assert supports(bench.scene, "box") == {"sponge"}
+    assert bench.do("pick(box, table)") is Status.SUCCESS, bench.context.failure
 
 
 def test_what_is_put_in_the_way_of_the_hand_is_gone_around_without_touching_it():

@@ -1,5 +1,6 @@
 """The believed scene in the planner's predicates."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -145,3 +146,10 @@ def test_what_stands_above_the_dustpan_s_rim_on_something_in_it_can_be_taken_fro
     assert place_of(scene, "cup") == "dustpan"
     assert place_of(scene.moved("cup", at(0.75, 0.15, 0.03)), "cup") is None
     assert place_of(scene.moved("mug", at(0, 1.0, -0.03)).moved("cup", at(0, 1.0, 0.03)), "cup") is None
+
+
+def test_what_stands_on_what_the_hand_holds_counts_as_on_the_table(tabletop):
+    scene = tabletop("cup mug").moved("mug", at(0, 1.0, 0.3)).moved("cup", at(0, 1.0, 0.36))
+    assert place_of(scene, "cup") is None
+    assert place_of(replace(scene, held=Held("mug", at(0, 0, 0))), "cup") == "table"
+    assert place_of(replace(scene, held=Held("cup", at(0, 0, 0))), "mug") is None
