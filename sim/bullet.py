@@ -233,9 +233,11 @@ class BulletPlant:
         self._shifted = {**self._shifted, name: SE3(X_WR.rotation, X_WR.translation + shift)}
         self._wake_all()
 
-    def set_friction(self, name: str, friction: float) -> None:
-        """From now on a body has this friction, for disturbances."""
-        p.changeDynamics(self._bodies[name], -1, lateralFriction=friction, physicsClientId=self._client)
+    def set_pad_friction(self, friction: float | None) -> None:
+        """From now on the fingers' pads have this friction, for disturbances; None: their own."""
+        for finger in self._finger_joints:
+            friction = self._pad_friction if friction is None else friction
+            p.changeDynamics(self._robot, finger, lateralFriction=friction, physicsClientId=self._client)
 
     def _wake_all(self) -> None:
         """The engine does not see that what rested on something that was moved lies on nothing now; nor do we yet."""
@@ -353,6 +355,7 @@ class BulletPlant:
         self._slip: tuple[float, float] | None = None
         self._grip: tuple[float, float] | None = None
         self._tau_max = robot.tau_max
+        self._pad_friction = robot.gripper.pad_friction
         self._max_grip_force = robot.gripper.max_force
         self._max_grip_speed = robot.gripper.max_speed
 
@@ -360,14 +363,9 @@ class BulletPlant:
             p.changeDynamics(
                 self._robot, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, physicsClientId=self._client
             )
+        self.set_pad_friction(None)
         for finger in self._finger_joints:
-            p.changeDynamics(
-                self._robot,
-                finger,
-                lateralFriction=robot.gripper.pad_friction,
-                spinningFriction=PAD_RESISTANCE,
-                physicsClientId=self._client,
-            )
+            p.changeDynamics(self._robot, finger, spinningFriction=PAD_RESISTANCE, physicsClientId=self._client)
         p.setJointMotorControlArray(
             self._robot, self._arm_joints, p.VELOCITY_CONTROL, forces=[0.0] * 7, physicsClientId=self._client
         )

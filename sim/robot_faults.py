@@ -1,4 +1,4 @@
-"""What goes wrong with the robot itself: joints that rub, fingers without force, someone who pushes."""
+"""What goes wrong with the robot itself: joints that rub, fingers without force or grip, someone who pushes."""
 
 from dataclasses import dataclass, replace
 
@@ -40,6 +40,22 @@ class Push(Fault):
 
     def cease(self, plant: BulletPlant) -> None:
         """A push lasts for one step only: nothing is left to end."""
+
+
+@dataclass(frozen=True)
+class SlipperyPads(Fault):
+    """The fingers' pads have another friction. What they let slip doesn't slide where it falls."""
+
+    friction: float
+
+    def begin(self, plant: BulletPlant) -> None:
+        plant.set_pad_friction(self.friction)
+
+    def act(self, plant: BulletPlant) -> None:
+        """Nothing more while it lasts."""
+
+    def cease(self, plant: BulletPlant) -> None:
+        plant.set_pad_friction(None)
 
 
 @dataclass(frozen=True)

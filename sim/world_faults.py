@@ -1,6 +1,6 @@
-"""What happens to the world: things are moved, taken away and brought, turn slippery, bins are shifted.
+"""What happens to the world: things are moved, taken away and brought, bins are shifted.
 
-Each happens once, before the first step at or after its start; what lasts ends with the fault.
+Each happens once, before the first step at or after its start.
 """
 
 from abc import ABC, abstractmethod
@@ -68,20 +68,3 @@ class BinShifted(_Deed):
 
     def begin(self, plant: BulletPlant) -> None:
         plant.shift_region(self.region, self.by)
-
-
-@dataclass(frozen=True)
-class Slippery(Fault):
-    """A body's friction is another for a while."""
-
-    name: str
-    friction: float
-
-    def begin(self, plant: BulletPlant) -> None:
-        plant.set_friction(self.name, self.friction)
-
-    def act(self, plant: BulletPlant) -> None:
-        """Nothing more while it lasts."""
-
-    def cease(self, plant: BulletPlant) -> None:
-        plant.set_friction(self.name, plant.scenario.bodies[self.name].friction)

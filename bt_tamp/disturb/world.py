@@ -16,7 +16,8 @@ from scenarios.shapes import extents
 from scenarios.solids import body_solid, region_hull, table_solid
 from scenarios.standing import overlap_problem
 from sim.scene import depth_below, height_above
-from sim.world_faults import BinShifted, Brought, Moved, Slippery, TakenAway
+from sim.robot_faults import SlipperyPads
+from sim.world_faults import BinShifted, Brought, Moved, TakenAway
 
 T = TypeVar("T")
 
@@ -154,7 +155,7 @@ def slipping(now: Occasion) -> Deed | None:
     name = now.held
     if name is None or not now.falls_within_reach(SLIPPERY + DROPPING):
         return None
-    fault = Slippery(start=now.t, end=now.t + SLIPPERY, name=name, friction=0.002)
+    fault = SlipperyPads(start=now.t, end=now.t + SLIPPERY, friction=0.002)
     return Deed(f"{name} turned slippery in the hand for 1 s", (fault,), names=(name,), loosens=True)
 
 

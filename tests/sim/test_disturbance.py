@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
+import pybullet
 import pytest
 from pinocchio import SE3
 
@@ -11,7 +12,7 @@ from sim.bullet import BulletPlant
 from sim.disturbance import DisturbedPlant, Fault
 from sim.plant import Command, GripCommand
 from sim.robot import RobotModel
-from sim.robot_faults import JointFriction, Push, WeakGrip
+from sim.robot_faults import JointFriction, Push, SlipperyPads, WeakGrip
 from sim.sensor_faults import (
     ForceBias,
     ForceDelay,
@@ -23,7 +24,7 @@ from sim.sensor_faults import (
     PoseMissing,
     PoseNoise,
 )
-from sim.world_faults import BinShifted, Brought, Moved, Slippery, TakenAway
+from sim.world_faults import BinShifted, Brought, Moved, TakenAway
 
 IDLE = GripCommand(0.0, 80.0)
 HOME = np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 80.0, 0.0])
@@ -222,12 +223,22 @@ def test_a_weak_grip_lets_the_fingers_be_pushed(make):
     assert plant.observe().grip_force < 1.0
 
 
-def test_what_turned_slippery_is_itself_again_afterwards(make):
-    frictions = []
-    plant = make(Slippery("stone", 0.01, start=0.01, end=0.02))
-    plant._plant.set_friction = lambda name, friction: frictions.append((name, friction))
-    watched(plant, 0.04)
-    assert frictions == [("stone", 0.01), ("stone", 0.5)]
+def test_pads_that_turned_slippery_are_themselves_again_afterwards(make):
+    plant = make(SlipperyPads(0.01, start=0.01, end=0.02))
+    found = [pad_friction(plant)]
+    for until in (0.015, 0.03):
+        watched(plant, until - plant.observe().t)
+        found.append(pad_friction(plant))
+    assert found == [1.2, 0.01, 1.2]
+
+
+def pad_friction(plant):
+    engine = plant._plant
+    (friction,) = {
+        pybullet.getDynamicsInfo(engine._robot, finger, physicsClientId=engine._client)[1]
+        for finger in engine._finger_joints
+    }
+    return friction
 
 
 def test_a_late_pose_says_when_it_was_true(make):
