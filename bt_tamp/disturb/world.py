@@ -15,8 +15,8 @@ from scenarios.scenario import Region
 from scenarios.shapes import extents
 from scenarios.solids import body_solid, region_hull, table_solid
 from scenarios.standing import overlap_problem
-from sim.scene import depth_below, height_above
 from sim.robot_faults import SlipperyPads
+from sim.scene import depth_below, height_above
 from sim.world_faults import BinShifted, Brought, Moved, TakenAway
 
 T = TypeVar("T")
