@@ -12,7 +12,7 @@ from planner.refinement import Budget, Hints, Phase, Refinement, pairs
 from planner.support import supports
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Body
-from sim.robot import GRAVITY
+from sim.robot import GRAVITY, Gripper
 from sim.scene import Held, SceneState
 from skills.carrying import MAX_ACCELERATION
 from skills.conditions import Achieved, HandHolds, Unladen
@@ -32,8 +32,12 @@ NEAR_SPEED = 0.12
 SAFETY = 1.5
 """How much more weight than there is the fingers' friction has to bear for an object to be carried."""
 
-GRIP_FORCE = 70.0
-"""Newtons with which each finger holds something hard."""
+GRIP_FORCE = (15.0, 70.0)
+"""Newtons with which each finger holds something hard, at least and at most."""
+
+GRIP_SAFETY = 40.0
+"""How much more than an object asks for while it is carried each finger presses, between those bounds: it must not turn
+in the hand either. Pressed much harder than that, something light creeps from between the pads."""
 
 SQUEEZE = 0.002
 """Metres by which the fingers may sink into something soft."""
@@ -136,13 +140,21 @@ class Pick:
         return (
             Phase("pre-grasp", "move", way.reach, opening),
             Phase("approach", "approach", approach, opening, allowed=touching),
-            Phase("close", "close", still, opening, allowed=resting, grip=grip_force(scene.scenario.bodies[name])),
+            Phase(
+                "close",
+                "close",
+                still,
+                opening,
+                allowed=resting,
+                grip=grip_force(scene.scenario.bodies[name], robot.gripper),
+            ),
             Phase("lift", "approach", lift, grasp.width, grasped.held, resting),
         )
 
 
-def grip_force(body: Body) -> float:
+def grip_force(body: Body, gripper: Gripper) -> float:
     """Newtons with which each finger holds a body: less where that would crush something soft."""
-    if body.contact_stiffness is None:
-        return GRIP_FORCE
-    return min(GRIP_FORCE, PAD_CONTACTS * body.contact_stiffness * SQUEEZE)
+    least, most = GRIP_FORCE
+    borne_by_one = body.mass * (GRAVITY + MAX_ACCELERATION) / (2 * gripper.pad_friction * body.friction)
+    force = float(np.clip(GRIP_SAFETY * borne_by_one, least, most))
+    return force if body.contact_stiffness is None else min(force, PAD_CONTACTS * body.contact_stiffness * SQUEEZE)

@@ -105,7 +105,8 @@ class Wipe:
             return outcome
 
         sponge = scene.scenario.bodies[held.name]
-        hold = 2 * self._kit.robot.gripper.pad_friction * sponge.friction * grip_force(sponge)
+        gripper = self._kit.robot.gripper
+        hold = 2 * gripper.pad_friction * sponge.friction * grip_force(sponge, gripper)
         strokes = list(strokes_for(place, action.args[0]))
         samples = (
             Wiping(stroke, pressing)

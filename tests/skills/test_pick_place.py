@@ -13,6 +13,7 @@ from planner.failure import RefinementFailure
 from planner.refinement import Refinement
 from planner.task.facts import place_of
 from scenarios.shapes import Box, Cylinder, Hull, reach
+from sim.scene import pose_distance
 
 
 @pytest.mark.parametrize(("x", "y", "yaw"), [(0.68, -0.08, 0.0), (0.55, 0.2, 0.6)])
@@ -121,3 +122,21 @@ def test_a_thin_rod_is_taken_up_from_where_it_lies(rod):
     assert bench.do("pick(box, table)") is Status.SUCCESS
     assert bench.do("place(box, right_bin)") is Status.SUCCESS
     assert place_of(bench.scene, "box") == "right_bin"
+
+
+def test_something_light_is_held_so_gently_that_it_does_not_creep_in_the_hand():
+    half, rim = 0.0244, ((0.0301, 0.0), (0.0151, 0.0424))
+    corners = [[side * x, y, z] for x, z in rim for side in (-1.0, 1.0) for y in (-half, half)]
+    wedge, centre = Hull.of(np.array(corners))
+    scene = scene_with("box")
+    X_WO = SE3(np.eye(3), np.array([0.484, -0.143, 0.05]) + centre)
+    light = replace(scene.bodies["box"], shape=wedge, mass=0.05, friction=0.55, X_WO=X_WO)
+    bench = Bench(replace(scene, bodies={"box": light}))
+    assert bench.do("pick(box, table)") is Status.SUCCESS
+    grip = bench.scene.held
+    bench.run(1500)
+    assert grip is not None
+    assert bench.scene.held is not None
+    distance, angle = pose_distance(grip.X_GO, bench.scene.held.X_GO)
+    assert distance < 0.001
+    assert np.degrees(angle) < 5.0
