@@ -107,6 +107,7 @@ class SkillContext:
     allowed: frozenset[frozenset[str]] = field(default_factory=frozenset)
 
     def fail(self, failure: Failure) -> None:
-        """Remember why the running action failed; the first reason counts."""
+        """Remember why the running action failed, and tell it at once; the first reason counts."""
         if self.failure is None:
             self.failure = failure
+            self.report("action_failed", action=str(failure.action), failure=failure.kind, reason=failure.reason)

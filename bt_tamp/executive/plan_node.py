@@ -161,10 +161,8 @@ class PlanNode(Behaviour):
         context = self._context
         failure = context.failure
         reason = self._agenda.review(context)
-        if failure is not None:
-            context.report("action_failed", action=str(failure.action), failure=failure.kind, reason=failure.reason)
-            if isinstance(failure, (ExecutionFailure, RefinementFailure)):
-                self._planner.search.learn(failure, context.scene)
+        if isinstance(failure, (ExecutionFailure, RefinementFailure)):
+            self._planner.search.learn(failure, context.scene)
         if self._planner.thinking.plans:
             context.report("replan", reason=reason)
         self._agenda.drop()

@@ -24,7 +24,14 @@ def ended(bench: Bench, root) -> Status:
 def test_a_push_in_the_middle_of_a_motion_stops_the_arm_and_the_action_works_when_begun_again():
     bench = Bench(scene_with("box"))
     step = bench.plant.step
-    pushed = []
+    pushed: list[float] = []
+    failed: list[float] = []
+
+    def told(kind: str, **data: object) -> None:
+        if kind == "action_failed":
+            failed.append(bench.context.observation.t)
+
+    bench.context.report = told
 
     def shoving_step() -> None:
         if 0.6 < bench.context.observation.t < 0.7:
@@ -38,6 +45,8 @@ def test_a_push_in_the_middle_of_a_motion_stops_the_arm_and_the_action_works_whe
     assert pushed
     assert isinstance(bench.context.failure, ArmStopped)
     assert "pushes joint" in bench.context.failure.reason
+    assert len(failed) == 1
+    assert failed[0] < pushed[0] + 0.1
 
     bench.context.failure = None
     assert ended(bench, LiftOff(bench.context)) is Status.SUCCESS
