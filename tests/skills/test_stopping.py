@@ -6,7 +6,10 @@ from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
 from planner.failure import ArmStopped
+from planner.motion.trajectory import Trajectory
+from sim.scene import pose_distance
 from skills.context import ActionRun
+from skills.control.reference import Reference
 from skills.lift_off import LiftOff
 
 
@@ -53,3 +56,26 @@ def test_a_push_in_the_middle_of_a_motion_stops_the_arm_and_the_action_works_whe
     assert bench.context.controller.stopped is None
     assert bench.do("pick(box, table)") is Status.SUCCESS
     assert bench.scene.held is not None
+
+
+def test_an_arm_that_swings_what_it_holds_stops_within_150_ms_and_it_does_not_slip():
+    bench = Bench(scene_with("box"))
+    assert bench.do("pick(box, table)") is Status.SUCCESS
+    q, duration = bench.context.observation.q, 1.97
+    s = np.linspace(0.0, 1.0, 60)[:, None]
+    swing = 1.2 * np.eye(7)[0]
+    rise, rate = s**3 * (10 - 15 * s + 6 * s * s), 30 * s * s * (1 - s) ** 2 / duration
+    swung = Trajectory(s[:, 0] * duration, q + rise * swing, rate * swing)
+    held = bench.scene.held
+    bench.context.controller.follow(Reference(swung))
+    bench.run(round(duration / 2 / 0.002))
+    assert abs(bench.context.observation.v[0]) > 1.1
+    bench.context.controller.hold()
+    bench.run(75)
+    assert bench.context.controller.is_still
+    bench.run(100)
+    assert held is not None
+    assert bench.scene.held is not None
+    distance, angle = pose_distance(held.X_GO, bench.scene.held.X_GO)
+    assert distance < 0.001
+    assert np.degrees(angle) < 1.0
