@@ -35,6 +35,10 @@ MAX_PROBES = 3
 """Further actions that are looked at, at most, when one like them was found obstructed."""
 
 
+FORGIVEN = 3
+"""How often a task planner that itself went wrong is asked again before budgets are widened for it."""
+
+
 @dataclass(frozen=True)
 class PlanSettings:
     """Bounds of planning, all counted, none in seconds.
@@ -166,7 +170,7 @@ class SearchThenSample:
     ) -> Solution | NoPlan:
         settings = self._settings
         self._budget = Budget(settings.tries, settings.motion_checks)
-        widenings = settings.widenings
+        widenings, forgiven = settings.widenings, FORGIVEN
         met: set[tuple[Any, ...]] = set()
         for number in range(1, settings.max_rounds + 1):
             problem, found = self._search(scene, goal, self.learned, work, number)
@@ -183,6 +187,9 @@ class SearchThenSample:
                 met.add(lesson)
             elif (proof := self._proof(scene, goal, found, work, number)) is not None:
                 return proof
+            if isinstance(found, NoTaskPlan) and found.failure and forgiven > 0:
+                forgiven -= 1
+                continue
             if isinstance(found, NoTaskPlan) or stale:
                 if widenings == 0:
                     return self._exhausted(found, number)

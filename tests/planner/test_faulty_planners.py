@@ -58,6 +58,24 @@ def test_a_task_planner_that_fails_once_is_asked_again(spoil, tabletop, stand_in
     assert [str(action) for action in outcome.plan.actions] == ["pick(cup, table)", "place(cup, right_bin)"]
 
 
+class EverySecond(Faulty):
+    """Pyperplan, of whose answers every second one is spoiled."""
+
+    def solve(self, domain_text, problem_text, max_expansions):
+        self.left = self.left + 1 if self.left < 1 else 0
+        found = self.real.solve(domain_text, problem_text, max_expansions)
+        return self.spoil(found) if self.left else found
+
+
+def test_a_task_planner_that_fails_every_second_time_is_asked_until_all_is_learned(tabletop, stand_in, is_at_start):
+    def blocking(action, _, scene):
+        return {"mug"} if action.args[0] == "cup" and action.name == "pick" and is_at_start(scene, "mug") else None
+
+    outcome = planned(EverySecond(crash, 0), stand_in(blocking), tabletop("cup mug"))
+    assert isinstance(outcome, Solution)
+    assert outcome.rounds == 4
+
+
 def test_a_task_planner_that_always_crashes_leads_to_no_plan_that_says_so(tabletop, stand_in):
     outcome = planned(Faulty(crash, -1), stand_in(lambda *_: None), tabletop("cup"))
     assert isinstance(outcome, NoPlan)
