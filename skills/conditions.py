@@ -21,14 +21,21 @@ EFFECT_TIME = 1.5
 class HandHolds(Behaviour):
     """Is it still in the hand, where it was when the guard began to look? `name` None: whatever is held then.
 
-    turn: rad by which it may have turned there.
+    turn: rad by which it may have turned there; sink: metres by which it may have gone deeper into the hand.
     """
 
-    def __init__(self, name: str | None, run: ActionRun, context: SkillContext, turn: float = SLIP_ANGLE) -> None:
+    def __init__(
+        self,
+        name: str | None,
+        run: ActionRun,
+        context: SkillContext,
+        turn: float = SLIP_ANGLE,
+        sink: float = SLIP_DISTANCE,
+    ) -> None:
         super().__init__("still held?" if name is None else f"{name} held?")
         self._expected = name
         self._run, self._context = run, context
-        self._turn = turn
+        self._turn, self._sink = turn, sink
         self._grip: Held | None = None
 
     def update(self) -> Status:
@@ -39,7 +46,8 @@ class HandHolds(Behaviour):
         if self._grip is None or self._grip.name != held.name:
             self._grip = held
         distance, angle = pose_distance(self._grip.X_GO, held.X_GO)
-        if distance > SLIP_DISTANCE or angle > self._turn:
+        sunk = float(self._grip.X_GO.translation[2] - held.X_GO.translation[2])
+        if distance > SLIP_DISTANCE or angle > self._turn or sunk > self._sink:
             return self._slipped(f"{held.name} slipped {distance * 1000:.0f} mm, {np.degrees(angle):.0f}° in the hand")
         return Status.SUCCESS
 

@@ -47,6 +47,9 @@ HOLD_SHARE = 0.6
 LOOK = 0.02
 """Metres between the poses of the hand at which a stroke is looked at before a way for the arm is sought."""
 
+MAX_SINK = 0.008
+"""Metres by which a sponge may go deeper into the hand: its fingertips would soon meet what it is pressed on."""
+
 TOUCH_SPEED = 0.03
 NEAR_SPEED = 0.15
 
@@ -143,7 +146,7 @@ class Wipe:
         crumb, _, pan = run.action.args[:3]
         return sequence(
             str(run.action),
-            guarded("hold", HandHolds(None, run, context), wiping),
+            guarded("hold", HandHolds(None, run, context, sink=MAX_SINK), wiping),
             Achieved(lambda scene: place_of(scene, crumb) == pan, run, context),
         )
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from bench import Bench, action, scene_with, with_pose
@@ -9,7 +10,7 @@ from pinocchio import SE3
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
-from planner.failure import GraspMissed, RefinementFailure, SceneChanged
+from planner.failure import GraspMissed, GraspSlipped, RefinementFailure, SceneChanged
 from planner.refinement import Budget, Hints, Refinement
 from planner.support import supports
 from planner.task.facts import place_of
@@ -160,6 +161,18 @@ def test_what_stirs_beside_the_stroke_does_not_end_it():
     assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
     nudge = shifted(bench, "box", 0.004, 0.0)
     assert carried_out(bench, "wipe(carrot, table, dustpan)", "descend", 0.1, nudge) is Status.SUCCESS
+
+
+def test_a_sponge_that_slips_up_between_the_fingers_ends_the_wipe_before_they_meet_the_table():
+    bench = Bench(scene_with("carrot", "sponge"))
+    assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
+    slippery = partial(bench.plant.set_pad_friction, 0.002)
+    assert carried_out(bench, "wipe(carrot, table, dustpan)", "descend", 0.3, slippery) is Status.FAILURE
+    assert isinstance(bench.context.failure, GraspSlipped)
+    for _ in range(30):
+        bench.run(10)
+        names = {frozenset((contact.first, contact.second)) for contact in bench.plant.contacts()}
+        assert not any("table" in pair and pair & bench.robot.finger_links for pair in names)
 
 
 def test_a_crumb_moved_while_the_sponge_comes_down_is_not_wiped_for_where_it_was():
