@@ -26,6 +26,9 @@ CLEARANCE = 0.01
 EDGE = 0.02
 """Metres by which what is put on the table stays away from its edge."""
 
+BEHIND = 0.08
+"""Metres on the table that a sponge takes up behind the middle of a crumb."""
+
 WORKSPACE = (0.42, 0.78)
 """Metres from the robot's axis between which what is put down can be taken up again."""
 
@@ -168,18 +171,27 @@ class Occasion:
     def spot(self, body: Body, rotation: np.ndarray, around: np.ndarray, distances: tuple[float, float]) -> SE3 | None:
         """A free place on the table for a body turned so: its distance (m) in the plane from `around` (2,) within
         `distances`; None if none was found."""
-        table, base = self.scenario.table, self.scenario.robot.X_WB.translation[:2]
-        half = np.array(table.size[:2]) / 2 - EDGE - min(bounding_radius(body.shape), 0.06)
-        z = self.table_height() + depth_below(body.shape, rotation) + 5e-4
+        margin = BEHIND if self.is_crumb(body.name) else EDGE + min(bounding_radius(body.shape), 0.06)
         for _ in range(DRAWS):
             angle, distance = self.rng.uniform(0.0, 2.0 * np.pi), self.rng.uniform(*distances)
             p = around + distance * np.array([np.cos(angle), np.sin(angle)])
-            X_WO = SE3(rotation, np.array([*p, z]))
-            on_table = np.abs(table.X_WT.actInv(X_WO.translation)[:2]) < half
-            reach = float(np.linalg.norm(p - base))
-            if on_table.all() and WORKSPACE[0] < reach < WORKSPACE[1] and self.stands_free(body, X_WO):
+            X_WO = self.placed(body, rotation, p)
+            if X_WO is not None and self.is_on_table(p, margin):
                 return X_WO
         return None
+
+    def placed(self, body: Body, rotation: np.ndarray, p: np.ndarray) -> SE3 | None:
+        """A body turned so at p (2,) on the table, within reach; None if it doesn't stand free there."""
+        z = self.table_height() + depth_below(body.shape, rotation) + 5e-4
+        X_WO, reach = SE3(rotation, np.array([*p, z])), np.linalg.norm(p - self.scenario.robot.X_WB.translation[:2])
+        is_good = self.is_on_table(p, 0.0) and WORKSPACE[0] < reach < WORKSPACE[1] and self.stands_free(body, X_WO)
+        return X_WO if is_good else None
+
+    def is_on_table(self, p: np.ndarray, margin: float) -> bool:
+        """Does a point (2,) lie at least `margin` metres inside the table's edges?"""
+        table = self.scenario.table
+        local = table.X_WT.actInv(np.array([*p, self.table_height()]))[:2]
+        return bool((np.abs(local) < np.array(table.size[:2]) / 2 - margin).all())
 
 
 Draw = Callable[[Occasion], Deed | None]

@@ -22,7 +22,7 @@ CLASSES: dict[str, Declared] = {
     "path-blocked": Declared("a post is put where the arm is going to come"),
     "stroke-blocked": Declared("a post is put where a stroke or a drag is going to come"),
     "knocked-from-hand": Declared("what is held is knocked from the hand onto the table"),
-    "slipping": Declared("what is held turns slippery for 1 s"),
+    "slipping": Declared("the fingers' pads turn slippery for 1 s while something is held"),
     "sponge-far": Declared("the sponge is put at another end of the table"),
     "sponge-covered": Declared("a box is put on the sponge"),
     "bin-shifted": Declared("a bin that is still needed is shifted by a third of its width or more"),

@@ -9,15 +9,16 @@ import numpy as np
 import pinocchio as pin
 from pinocchio import SE3
 
-from bt_tamp.disturb.deed import Deed, Later, Occasion
+from bt_tamp.disturb.deed import BEHIND, DRAWS, Deed, Later, Occasion
 from planner.task.symbols import Fact
-from scenarios.scenario import Region
+from scenarios.scenario import Body, Region
 from scenarios.shapes import extents
 from scenarios.solids import body_solid, region_hull, table_solid
 from scenarios.standing import overlap_problem
 from sim.robot_faults import SlipperyPads
 from sim.scene import depth_below, height_above
 from sim.world_faults import BinShifted, Brought, Moved, TakenAway
+from skills.strokes import Opening, opening_of
 
 T = TypeVar("T")
 
@@ -232,18 +233,28 @@ def bin_shifted(now: Occasion) -> Deed | None:
 
 
 def crumbs_beside_pan(now: Occasion) -> Deed | None:
-    """A crumb comes to lie on the table's edge, beside the dustpan's opening."""
-    pans = [region for region in now.scenario.regions.values() if region.kind == "dustpan"]
+    """A crumb comes to lie on the table beside the dustpan's opening, where a sponge has room to push it in aslant."""
     crumbs = [name for name in now.truth.poses if now.is_crumb(name) and name != now.held]
+    pans = [region for region in regions_now(now).values() if region.kind == "dustpan"]
     for pan in pans:
+        opening = opening_of(pan, now.scenario.table)
         for name in _shuffled(now, [name for name in crumbs if name in _goal_bodies(now)]):
-            body = now.scenario.bodies[name]
-            beside = pan.X_WR.translation[:2] + (pan.size[0] / 2 + 0.03) * now.rng.choice([-1.0, 1.0]) * np.array(
-                [1.0, 0]
-            )
-            spot = now.spot(body, np.eye(3), beside, (0.05, 0.20))
+            spot = None if opening is None else _beside(now, now.scenario.bodies[name], opening)
             if spot is not None:
                 return _put(now, name, spot, f"{name} came to lie on the table beside {pan.name}")
+    return None
+
+
+def _beside(now: Occasion, body: Body, opening: Opening) -> SE3 | None:
+    """A spot from which a straight way leads into the opening at 45° at most, with room for a sponge behind it."""
+    for _ in range(DRAWS):
+        side, past = now.rng.choice([-1.0, 1.0]) * opening.across, now.rng.uniform(0.01, 0.06)
+        before = now.rng.uniform(0.04 + past, 0.16)
+        p = opening.middle + (opening.half_width + past) * side - before * opening.inward
+        behind = p - BEHIND * (opening.inward - side) / np.sqrt(2.0)
+        spot = now.placed(body, np.eye(3), p)
+        if spot is not None and now.is_on_table(behind, 0.0):
+            return spot
     return None
 
 
