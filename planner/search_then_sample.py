@@ -34,7 +34,6 @@ from sim.scene import SceneState
 MAX_PROBES = 3
 """Further actions that are looked at, at most, when one like them was found obstructed."""
 
-
 FORGIVEN = 3
 """How often a task planner that itself went wrong is asked again before budgets are widened for it."""
 

@@ -58,6 +58,8 @@ class SceneState:
 
     def without(self, names: frozenset[str]) -> "SceneState":
         """The same scene with the named bodies taken out of the world (they obstruct nothing)."""
+        if names.isdisjoint(self.poses):
+            return self
         return replace(self, poses={n: X for n, X in self.poses.items() if n not in names})
 
 

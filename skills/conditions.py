@@ -14,6 +14,9 @@ from skills.watching import Load
 
 SLIP_DISTANCE = 0.02
 SLIP_ANGLE = np.radians(20.0)
+SUNK_FOR = 0.06
+"""Seconds for which something must be seen deeper in the hand: poses are noisy, and this limit is near."""
+
 EFFECT_TIME = 1.5
 """Simulated seconds that an effect may take to show (things fall, roll and come to rest)."""
 
@@ -37,6 +40,7 @@ class HandHolds(Behaviour):
         self._run, self._context = run, context
         self._turn, self._sink = turn, sink
         self._grip: Held | None = None
+        self._sunk_since: float | None = None
 
     def update(self) -> Status:
         held = self._context.scene.held
@@ -47,15 +51,23 @@ class HandHolds(Behaviour):
             self._grip = held
         distance, angle = pose_distance(self._grip.X_GO, held.X_GO)
         sunk = float(self._grip.X_GO.translation[2] - held.X_GO.translation[2])
-        if distance > SLIP_DISTANCE or angle > self._turn or sunk > self._sink:
+        if distance > SLIP_DISTANCE or angle > self._turn or self._stays_sunk(sunk):
             return self._slipped(f"{held.name} slipped {distance * 1000:.0f} mm, {np.degrees(angle):.0f}° in the hand")
         return Status.SUCCESS
+
+    def _stays_sunk(self, sunk: float) -> bool:
+        now = self._context.observation.t
+        if sunk <= self._sink:
+            self._sunk_since = None
+        elif self._sunk_since is None:
+            self._sunk_since = now
+        return self._sunk_since is not None and now - self._sunk_since >= SUNK_FOR
 
     def _slipped(self, reason: str) -> Status:
         sample = self._run.refinement.sample if self._run.refinement else None
         self._context.fail(GraspSlipped(self._run.action, reason, sample))
         self.feedback_message = reason
-        self._grip = None
+        self._grip = self._sunk_since = None
         return Status.FAILURE
 
 

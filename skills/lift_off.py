@@ -29,10 +29,14 @@ class LiftOff(Behaviour):
         super().__init__("lift off")
         self._context = context
         self._since = 0.0
+        self._has_begun = False
 
     def initialise(self) -> None:
+        self._since, self._has_begun = self._context.observation.t, False
+
+    def _begin(self) -> None:
         context = self._context
-        self._since = context.observation.t
+        self._has_begun = True
         if context.controller.contact:
             trajectory = straight_up(context.robot, context.observation.q, HEIGHT, DURATION)
             context.controller.follow(Reference(trajectory))
@@ -41,6 +45,11 @@ class LiftOff(Behaviour):
 
     def update(self) -> Status:
         controller, waited = self._context.controller, self._context.observation.t - self._since
+        if not self._has_begun:
+            # What is stopped in the tick that puts the plan out of force tells the arm to hold, after this.
+            if waited > 0.0:
+                self._begin()
+            return Status.RUNNING
         if controller.stopped is not None and waited > GIVING_WAY:
             controller.acknowledge()
         return Status.SUCCESS if controller.finished or waited > PATIENCE else Status.RUNNING

@@ -106,7 +106,7 @@ class Follow(PhaseLeaf):
 
     def watch(self) -> Status:
         controller = self._context.controller
-        if controller.finished:
+        if controller.passed or controller.finished:
             return Status.SUCCESS
         off = controller.tracking_error.joint
         if off > OFF_PATH:

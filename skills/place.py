@@ -21,6 +21,7 @@ from skills.conditions import Achieved, HandHolds
 from skills.context import ActionRun, SkillContext
 from skills.motions import Follow, Open, guarded, sequence
 from skills.refine import Refine
+from skills.riding import driven_into
 from skills.skill import Toolkit, Unfit, hand_would_hit, refine_by_sampling
 from skills.way_search import find_way
 from skills.waypoints import back_off, raised
@@ -93,6 +94,11 @@ class Place:
             outcome = self._attempt(action, placement, world.without(along))
             if not isinstance(outcome, tuple):
                 return outcome
+            there = along & world.poses.keys()
+            hit = driven_into(self._kit.robot, world, there, [phase.trajectory for phase in outcome[:2]])
+            if hit is not None:
+                culprits = frozenset({hit}) & world.poses.keys()
+                return Unfit(f"{', '.join(sorted(there))} on {name} would be driven into {hit}", culprits)
             return tuple(replace(phase, allowed=phase.allowed | coming_along) for phase in outcome)
 
         body = scene.scenario.bodies[name]

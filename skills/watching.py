@@ -10,6 +10,7 @@ from planner.failure import MotionFailure
 from planner.motion.motion_planner import MotionPlanner
 from planner.refinement import Phase, Refinement
 from planner.support import burden
+from scenarios.goal import is_crumb
 from sim.scene import SceneState, pose_distance
 
 SHIFT = 0.008
@@ -80,10 +81,12 @@ class Watch:
 
 
 class Load:
-    """What stands on some bodies, compared with what stood on them in an earlier scene."""
+    """What stands on some bodies, in the hand or not, compared with what stood on them in an earlier scene. Crumbs are
+    only pushed, whatever stands on them."""
 
     def __init__(self, names: Sequence[str], scene: SceneState) -> None:
-        self._borne = {name: burden(scene, name) for name in names}
+        crumbs = {name for name in names if is_crumb(scene.scenario.bodies[name], scene.scenario.robot.model)}
+        self._borne = {name: _burden(scene, name) for name in names if name not in crumbs}
         self._looked_at = scene.poses
 
     def come(self, scene: SceneState) -> str | None:
@@ -91,11 +94,15 @@ class Load:
         if not _stirred(self._looked_at, scene):
             return None
         for name, borne in self._borne.items():
-            more = burden(scene, name) - borne if name in scene.poses else ()
+            more = _burden(scene, name) - borne if name in scene.poses else ()
             if more:
                 return f"{', '.join(sorted(more))} came to stand on {name}"
         self._looked_at = scene.poses
         return None
+
+
+def _burden(scene: SceneState, name: str) -> frozenset[str]:
+    return burden(replace(scene, held=None), name)
 
 
 def _stirred(before: Mapping[str, SE3], scene: SceneState) -> list[str]:

@@ -1,6 +1,7 @@
 """Finds ways of the hand, and how the free motion passes into the line after it."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from pinocchio import SE3
@@ -81,29 +82,38 @@ def find_way(
         if failure is None:
             reach = carried(toolkit.robot, reach, scene.held)
             done = [line for line in timed if isinstance(line, Trajectory)]
+            corner = 0.0
             for k, line in enumerate(lines):
                 if line.is_entry:
-                    reach, done[k] = entered(toolkit, reach, line, done[k], allowed)
-            way = Way(tuple(waypoints), scene, allowed, tuple(legs), tuple(lines), reach, tuple(done))
+                    reach, done[k], corner = entered(toolkit, scene, Entry(reach, line, done[k], allowed))
+            way = Way(tuple(waypoints), scene, allowed, tuple(legs), tuple(lines), reach, tuple(done), corner)
             known.keep(way)
             return way
     return failure or Unfit("the arm can't follow the hand's path")
 
 
-def entered(
-    toolkit: Toolkit, reach: Trajectory, line: Line, timed: Trajectory, allowed: frozenset[Pair]
-) -> tuple[Trajectory, Trajectory]:
-    """The free motion and the line after it, without a stop between them if there is room to cut the corner: while
-    the free motion lasts nothing but its own `allowed` pairs touch."""
-    robot, motion = toolkit.robot, toolkit.motion
-    longest = MOST_OVERLAP * min(reach.duration, timed.duration)
+@dataclass(frozen=True)
+class Entry:
+    """A free motion, during which `allowed` pairs may touch, and the line after it, as timed."""
+
+    reach: Trajectory
+    line: Line
+    timed: Trajectory
+    allowed: frozenset[Pair]
+
+
+def entered(toolkit: Toolkit, scene: SceneState, entry: Entry) -> tuple[Trajectory, Trajectory, float]:
+    """The free motion and the line after it, without a stop between them if there is room to cut the corner, and the
+    seconds of the line for which it is cut. Until then nothing but the free motion's own `allowed` pairs touch."""
+    robot, motion, line = toolkit.robot, toolkit.motion, entry.line
+    longest = MOST_OVERLAP * min(entry.reach.duration, entry.timed.duration)
     for overlap in dict.fromkeys(min(seconds, longest) for seconds in OVERLAPS):
         if overlap < LEAST_OVERLAP:
             break
-        head, entry = passing(reach, timed, overlap)
-        if haste(entry, robot) > 1.0 or acceleration(robot, entry, line.scene.held) > MAX_ACCELERATION:
+        head, timed = passing(entry.reach, entry.timed, overlap)
+        if haste(timed, robot) > 1.0 or acceleration(robot, timed, line.scene.held) > MAX_ACCELERATION:
             continue
-        corner = entry.until(overlap)
-        if motion.audit(line.scene, corner, allowed) is None and motion.audit(line.scene, entry, line.allowed) is None:
-            return head, entry
-    return reach, timed
+        corner = motion.audit(scene, timed.until(overlap), entry.allowed)
+        if corner is None and motion.audit(line.scene, timed, line.allowed) is None:
+            return head, timed, overlap
+    return entry.reach, entry.timed, 0.0

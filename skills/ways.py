@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from pinocchio import SE3
 
-from planner.motion.motion_planner import MotionPlanner
+from planner.motion.motion_planner import DEEPEST, MotionPlanner
 from planner.motion.trajectory import Trajectory
 from planner.refinement import Pair
 from sim.scene import SceneState, pose_distance
@@ -43,7 +43,7 @@ class Line:
 @dataclass(frozen=True)
 class Way:
     """A free motion to where the first leg begins, and the lines as timed. Where the motion ends moving, the line that
-    is its entry goes on from there.
+    is its entry goes on from there, and cuts the corner for `corner` seconds.
 
     It leads through poses X_WG in `scene` along the legs, and `allowed` pairs may touch during the free motion.
     """
@@ -55,6 +55,7 @@ class Way:
     lines: tuple[Line, ...]
     reach: Trajectory
     timed: tuple[Trajectory, ...]
+    corner: float = 0.0
 
 
 class KnownWays:
@@ -91,11 +92,13 @@ class KnownWays:
 
 def _is_free(motion: MotionPlanner, way: Way, scene: SceneState, lines: Sequence[Line], moved: frozenset[str]) -> bool:
     """Is nothing of what has moved in the way?"""
-    if motion.audit(scene, way.reach, way.allowed, only=moved) is not None:
+    if motion.audit(scene, way.reach, way.allowed, only=moved, deepest=DEEPEST) is not None:
         return False
     for line, timed in zip(lines, way.timed, strict=True):
+        if line.is_entry and way.corner and motion.audit(scene, timed.until(way.corner), way.allowed, only=moved):
+            return False
         if line.checked is None:
-            failure = motion.audit(line.scene, timed, line.allowed, only=moved)
+            failure = motion.audit(line.scene, timed, line.allowed, only=moved, deepest=DEEPEST)
         else:
             failure = motion.line_is_free(line.scene, line.path[: line.checked], line.allowed)
         if failure is not None:

@@ -172,7 +172,7 @@ class Wipe:
         held = scene.held
         assert held is not None
         stroke = wiping.stroke
-        on_it = borne(scene)
+        on_it = borne(scene) - _crumbs(scene, self._kit.robot.gripper.min_grasp_extent)
         if on_it:
             return Unfit(f"{', '.join(sorted(on_it))} would come along on {held.name}", on_it)
         if not place.taken(stroke, surely=False)[place.crumbs.names.index(action.args[0])]:

@@ -152,12 +152,14 @@ def knocked_from_hand(now: Occasion) -> Deed | None:
 
 
 def slipping(now: Occasion) -> Deed | None:
-    """What is held turns slippery for a while, over something that catches it."""
+    """The fingers' pads turn slippery for a while, over something that catches what is held."""
     name = now.held
     if name is None or not now.falls_within_reach(SLIPPERY + DROPPING):
         return None
     fault = SlipperyPads(start=now.t, end=now.t + SLIPPERY, friction=0.002)
-    return Deed(f"{name} turned slippery in the hand for 1 s", (fault,), names=(name,), loosens=True)
+    return Deed(
+        f"the fingers' pads turned slippery for 1 s with {name} in the hand", (fault,), names=(name,), loosens=True
+    )
 
 
 def closes_on_nothing(now: Occasion) -> Deed | None:

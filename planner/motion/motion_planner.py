@@ -170,17 +170,19 @@ class MotionPlanner:
         margin: float | None = None,
         since: float = 0.0,
         only: frozenset[str] | None = None,
+        deepest: float = -np.inf,
     ) -> MotionFailure | None:
         """None if what is left of the trajectory `since` seconds after its start is free by the exact model.
 
-        What is near then already may stay as near, see `move`. `only` these bodies are looked at (None: everything).
+        What is near then already may stay as near, see `move`, unless it is nearer than `deepest` (m; negative:
+        overlap). `only` these bodies are looked at (None: everything).
         """
         start = trajectory.at(since)[0]
         if only is not None:
             others = frozenset(obstacle.name for obstacle in obstacles(scene)) - only
             allowed = allowed | pairs(frozenset(part_names(self.robot, scene.held)), others)
         margins = Margins(self.settings.audit_margin if margin is None else margin, allowed)
-        near = self._near(scene, start, margins)
+        near = [contact for contact in self._near(scene, start, margins) if contact.distance >= deepest]
         left = trajectory.q[trajectory.times - trajectory.times[0] > since]
         return self._audit(scene, np.concatenate([start[None], left]), _relaxed(margins, near))
 
@@ -201,9 +203,10 @@ class MotionPlanner:
         if isinstance(ends, MotionFailure):
             return ends
         walled_in = cache(lambda: self._walled_in(scene.without(movables(scene)), ends, seed))
+        is_enclosed = cache(lambda: self._enclosed(scene, ends, seed) is not None)
 
         def hopeless() -> bool:
-            return walled_in() is not None or self._enclosed(scene, ends, seed) is not None
+            return walled_in() is not None or (bool(movables(scene)) and is_enclosed())
 
         for attempt in range(_ATTEMPTS):
             path = self._polyline(scene, ends, seed + attempt, max_checks, hopeless)

@@ -156,19 +156,25 @@ class ArmController:
 
     @property
     def finished(self) -> bool:
-        """Whether the trajectory's time is over and the arm at rest (in position mode: there), unless it passes into
-        another, or, until contact, the force has been ramped up and settled. Never once `stopped`."""
+        """Whether the trajectory's time is over, with that of what it passes into, and the arm at rest (in position
+        mode: there), or, until contact, the force has been ramped up and settled. Never once `stopped`."""
         state = self._state
         if state is None or self._pending is not None or self._hold_pending or self.stopped is not None:
             return False
         if self._reference is not None and self._reference.until_contact and self._pressed:
             return self._loop.time_since_ramp >= PRESSED_SETTLING
-        if self._reference is not None and self._reference.then is not None:
-            return self._course.time >= self._reference.trajectory.duration
         if not self._course.over or np.abs(state.v).max() > AT_REST:
             return False
         in_position = self._reference is None or self._reference.mode == "position"
         return not in_position or self.tracking_error.joint < ARRIVED
+
+    @property
+    def passed(self) -> bool:
+        """Whether the trajectory's time is over, the arm passing into what comes `then`."""
+        reference = self._reference
+        if reference is None or reference.then is None or self._pending is not None or self._hold_pending:
+            return False
+        return self._course.time >= reference.trajectory.duration
 
     @property
     def contact(self) -> bool:
@@ -264,7 +270,8 @@ class ArmController:
 
     def _begin(self, reference: Reference, state: ArmState) -> None:
         before = self._reference
-        if before is not None and before.then is not None and before.then is reference.trajectory:
+        is_next = before is not None and before.then is not None and before.then is reference.trajectory
+        if before is not None and is_next and reference.mode == "position":
             self._reference, self._pending = reference, None
             self._course = self._course.passed(reference.course, before.trajectory.duration)
             return

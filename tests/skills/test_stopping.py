@@ -1,7 +1,7 @@
 """An arm that is pushed while it moves: it stops, says so, and goes on when asked again."""
 
 import numpy as np
-from bench import Bench, action, scene_with
+from bench import TICKS_PER_TREE, Bench, action, scene_with
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
@@ -79,3 +79,23 @@ def test_an_arm_that_swings_what_it_holds_stops_within_150_ms_and_it_does_not_sl
     distance, angle = pose_distance(held.X_GO, bench.scene.held.X_GO)
     assert distance < 0.001
     assert np.degrees(angle) < 1.0
+
+
+def test_a_plan_dropped_in_the_middle_of_a_stroke_lifts_the_sponge_off_before_anything_is_planned():
+    bench = Bench(scene_with("sponge", "carrot"))
+    assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
+    context, lift = bench.context, LiftOff(bench.context)
+    act = bench.skills["wipe"].subtree(ActionRun(action("wipe(carrot, table, dustpan)")), context)
+    while context.phase.name != "stroke" or context.controller.contact_force < 5.0:
+        act.tick_once()
+        bench.run(TICKS_PER_TREE)
+    lift.tick_once()
+    # In the tick that puts the plan out of force what it had under way is stopped last.
+    act.stop(Status.INVALID)
+    height = bench.robot.X_WG(context.observation.q).translation[2]
+    while lift.status is Status.RUNNING:
+        bench.run(TICKS_PER_TREE)
+        lift.tick_once()
+    assert lift.status is Status.SUCCESS
+    assert bench.robot.X_WG(context.observation.q).translation[2] - height > 0.04
+    assert not context.controller.contact

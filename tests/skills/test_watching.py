@@ -17,6 +17,7 @@ from planner.task.facts import place_of
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, extents
 from skills.context import ActionRun
+from skills.control.controller import AT_REST
 
 
 def carried_out(bench: Bench, text: str, phase: str, share: float, disturb: Callable[[], None]) -> Status:
@@ -89,6 +90,33 @@ def test_an_object_moved_while_the_hand_comes_for_it_is_picked_where_it_is_now()
     assert [reason for kind, reason in told if kind == "refined_again"] == ["box was moved"]
 
 
+def test_what_moves_as_the_reach_passes_into_the_approach_is_planned_for_with_the_arm_at_rest():
+    bench = Bench(scene_with("box"))
+    speeds, starts = [], []
+    planned = bench.context.refine
+
+    def refine(what):
+        speeds.append(np.abs(bench.context.observation.v).max())
+        starts.append(bench.context.observation.q)
+        return planned(what)
+
+    bench.context.refine = refine
+    what = action("pick(box, table)")
+    run = ActionRun(what)
+    tree = BehaviourTree(bench.skills["pick"].subtree(run, bench.context))
+    while not bench.context.controller.passed:
+        tree.tick()
+        bench.run(1)
+    shifted(bench, "box", -0.05, 0.05)()
+    bench.run(5)
+    while tree.root.status is Status.RUNNING:
+        tree.tick()
+        bench.run(10)
+    assert tree.root.status is Status.SUCCESS
+    assert len(speeds) == 2
+    assert max(speeds) < AT_REST
+
+
 def test_what_is_put_on_an_object_while_the_hand_comes_for_it_has_to_go_first():
     bench = Bench(with_small_box("box", "sponge"))
     told = events_of(bench)
@@ -107,6 +135,21 @@ def test_what_is_put_on_an_object_while_the_fingers_close_is_not_lifted_with_it(
     assert bench.context.failure.reason == "box came to stand on sponge"
     bench.run(300)
     assert bench.scene.held is None
+
+
+def test_what_is_put_on_an_object_that_the_fingers_hold_already_is_not_lifted_with_it():
+    bench = Bench(with_small_box("box", "sponge"))
+    run = ActionRun(action("pick(sponge, dustpan)"))
+    tree = BehaviourTree(bench.skills["pick"].subtree(run, bench.context))
+    while bench.scene.held is None:
+        tree.tick()
+        bench.run(10)
+    put_on(bench, "box", "sponge")()
+    while tree.root.status is Status.RUNNING:
+        tree.tick()
+        bench.run(10)
+    assert isinstance(bench.context.failure, SceneChanged)
+    assert bench.context.failure.reason == "box came to stand on sponge"
 
 
 def test_what_was_lifted_with_an_object_can_be_taken_from_it_once_that_is_put_down():

@@ -8,14 +8,14 @@ from bench import TICKS_PER_TREE, Bench, action, scene_with
 from py_trees.common import Status
 
 from planner.motion.timing import haste, joined
-from planner.refinement import Phase, Refinement
+from planner.refinement import Phase, Refinement, pairs
 from scenarios.scenario import Fixture
 from scenarios.shapes import Box
 from skills.carrying import MAX_ACCELERATION, acceleration
 from skills.context import ActionRun
 from skills.motions import Follow
 from skills.skill import ContactSettings, Toolkit
-from skills.way_search import entered
+from skills.way_search import Entry, entered
 from skills.waypoints import raised, shifted
 from skills.ways import Line
 
@@ -81,13 +81,18 @@ def test_a_corner_with_something_in_it_is_not_cut():
     path = bench.motion.lines([there, raised(there, -0.08)], scene.q)[0]
     reach, line = bench.motion.move(scene, [path[0]]), Line(scene, path, 0.15, frozenset())
     timed = bench.motion.timed_line(scene, path, 0.15)
-    cut, entry = entered(toolkit, reach, line, timed, frozenset())
+    cut, entry, corner = entered(toolkit, scene, Entry(reach, line, timed, frozenset()))
     assert cut.ends_moving
+    assert corner > 0.0
     post = Fixture("post", Box((0.02, 0.15, 0.02)), bench.robot.X_WG(entry.at(0.1)[0]), 0.5, (1.0, 1.0, 1.0, 1.0))
     walled = replace(scene, scenario=replace(scene.scenario, fixtures={"post": post}))
-    kept, after = entered(toolkit, reach, replace(line, scene=walled), timed, frozenset())
-    assert kept is reach
-    assert after is timed
+    # What only the line may touch is in the way of the corner too.
+    touching = replace(line, scene=walled, allowed=pairs(bench.robot.hand_links, "post"))
+    for kind in (replace(line, scene=walled), touching):
+        kept, after, corner = entered(toolkit, walled, Entry(reach, kind, timed, frozenset()))
+        assert kept is reach
+        assert after is timed
+        assert corner == 0.0
 
 
 def test_an_arm_that_has_arrived_sets_out_again_at_once():

@@ -3,9 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from bench import Bench, action, scene_with, with_pose
 from pinocchio import SE3
+from py_trees.common import Status
 
 from planner.refinement import Budget, Hints, Refinement
 from sim.scene import SceneState
@@ -81,3 +83,42 @@ def test_an_object_that_lies_elsewhere_gets_a_way_of_its_own(bench):
     again, _ = _pick(bench, replace(bench.scene, poses=other.poses), first.sample)
     grasp = bench.robot.X_WG(again.phases[1].trajectory.end)
     np.testing.assert_allclose(grasp.homogeneous, (other.poses["box"] * first.sample.X_OG).homogeneous, atol=1e-6)
+
+
+def test_a_way_with_the_hand_as_open_or_holding_otherwise_is_another(bench):
+    lifted = Bench(scene_with("box"))
+    assert lifted.do("pick(box, table)") is Status.SUCCESS
+    scene, place = lifted.scene, action("place(box, table)")
+
+    def placed(scene: SceneState, sample: object = None) -> Refinement:
+        hints = Hints(first=() if sample is None else (sample,))
+        found = lifted.skills["place"].refine(place, scene, np.random.default_rng(0), Budget(), hints)
+        assert isinstance(found, Refinement), found
+        return found
+
+    first = placed(scene)
+    assert placed(scene, first.sample).phases[0].trajectory is first.phases[0].trajectory
+    held = scene.held
+    assert held is not None
+    turned = replace(held, X_GO=held.X_GO * SE3(pin.exp3(np.array([0.0, 0.0, 2e-3])), np.zeros(3)))
+    for other in (replace(scene, opening=scene.opening + 2e-3), replace(scene, held=turned)):
+        assert placed(other, first.sample).phases[0].trajectory is not first.phases[0].trajectory
+
+
+def test_what_has_come_to_where_the_fingers_will_open_is_avoided():
+    bench = Bench(scene_with("sponge", "carrot"))
+    grasped = bench.refine(action("pick(sponge, dustpan)"))
+    assert isinstance(grasped, Refinement)
+    scene, place = bench.skills["pick"].predict(bench.scene, grasped), action("place(sponge, table)")
+    first = bench.skills["place"].refine(place, scene, np.random.default_rng(0), Budget(), Hints())
+    assert isinstance(first, Refinement)
+    X_WG = bench.robot.X_WG({phase.name: phase for phase in first.phases}["descend"].trajectory.end)
+    assert scene.held is not None
+    aside = X_WG.translation + 0.07 * X_WG.rotation[:, 1]
+    height = float((X_WG * scene.held.X_GO).translation[2]) - 0.0075
+    beside = scene.moved("carrot", SE3(np.eye(3), np.array([*aside[:2], height])))
+    again = bench.skills["place"].refine(
+        place, beside, np.random.default_rng(1), Budget(), Hints(first=(first.sample,))
+    )
+    assert isinstance(again, Refinement)
+    assert again.sample != first.sample
