@@ -31,6 +31,9 @@ STANDOFF = 0.12
 RETREAT = 0.12
 NEAR_SPEED = 0.15
 
+TIGHT = 0.014
+"""Metres by which the fingers open, at least, to let go, where there is no room for more."""
+
 
 def place_named(scenario: Scenario, name: str) -> Region | Table:
     """The region of that name, or the table. Raises KeyError naming the known places."""
@@ -111,8 +114,7 @@ class Place:
         drawn = (sample for turn in zip_longest(*ways) for sample in turn if sample is not None)
 
         def has_room(placement: Placement) -> bool:
-            X_WG = placement.X_WO * holding[1].inverse()
-            return hand_would_hit(self._kit, bare, X_WG, pairs(self._kit.robot.finger_links, name)) is None
+            return isinstance(self._release(name, placement, bare), float)
 
         samples = clear_first(drawn, body, standing_about(bare), has_room)
         nothing = f"{name}, as it is held, fits nowhere in {goal}"
@@ -139,6 +141,23 @@ class Place:
             Achieved(lambda scene: scene.held is None and place_of(scene, name) == goal, run, context),
         )
 
+    def _release(self, name: str, placement: Placement, scene: SceneState) -> float | Unfit:
+        """Opening in metres with which the fingers let go without meeting anything, as wide as there is room for."""
+        gripper, held = self._kit.robot.gripper, scene.held
+        assert held is not None
+        X_WG = placement.X_WO * held.X_GO.inverse()
+        let_go = replace(scene.moved(name, placement.X_WO), held=None)
+        unfit = hand_would_hit(self._kit, scene, X_WG, pairs(self._kit.robot.finger_links, name))
+        if unfit:
+            return unfit
+
+        def opened(width: float) -> Unfit | None:
+            open_hand = replace(let_go, opening=width)
+            return hand_would_hit(self._kit, open_hand, X_WG, pairs(self._kit.robot.hand_links, name))
+
+        wide, tight = open_width(gripper, scene.opening), min(gripper.stroke, scene.opening + TIGHT)
+        return wide if opened(wide) is None else opened(tight) or tight
+
     def _attempt(
         self, action: GroundAction, placement: Placement, scene: SceneState
     ) -> tuple[Phase, ...] | MotionFailure | Unfit:
@@ -151,11 +170,10 @@ class Place:
         touching = pairs(robot.finger_links, name)
         lowering = touching | pairs(name, goal)
         X_WG = placement.X_WO * held.X_GO.inverse()
-        unfit = hand_would_hit(self._kit, scene, X_WG, touching)
-        if unfit:
-            return unfit
+        opening = self._release(name, placement, scene)
+        if isinstance(opening, Unfit):
+            return opening
 
-        opening = open_width(robot.gripper, scene.opening)
         released = replace(scene.moved(name, placement.X_WO), held=None, opening=opening)
         leaving = lowering | pairs(robot.hand_links, name)
 

@@ -10,7 +10,8 @@ from pinocchio import SE3
 from py_trees.common import Status
 
 from planner.failure import RefinementFailure
-from planner.refinement import Refinement
+from planner.placements import Placement
+from planner.refinement import Budget, Hints, Refinement, pairs
 from planner.task.facts import place_of
 from scenarios.shapes import Box, Cylinder, Hull, reach
 from sim.scene import pose_distance
@@ -140,3 +141,35 @@ def test_something_light_is_held_so_gently_that_it_does_not_creep_in_the_hand():
     distance, angle = pose_distance(grip.X_GO, bench.scene.held.X_GO)
     assert distance < 0.001
     assert np.degrees(angle) < 5.0
+
+
+def test_fingers_that_let_go_beside_a_wall_open_no_further_than_there_is_room():
+    bench = Bench(scene_with("box"))
+    grasped = bench.refine(action("pick(box, table)"))
+    assert isinstance(grasped, Refinement)
+    scene, place = bench.skills["pick"].predict(bench.scene, grasped), action("place(box, right_bin)")
+    assert scene.held is not None
+    bin_ = scene.scenario.regions["right_bin"]
+
+    def placed(*first: object) -> Refinement:
+        found = bench.skills["place"].refine(place, scene, np.random.default_rng(0), Budget(), Hints(first=first))
+        assert isinstance(found, Refinement), found
+        return found
+
+    middle = placed().sample
+    closing = (middle.X_WO * scene.held.X_GO.inverse()).rotation[:, 1]
+    axis = int(np.argmax(np.abs(closing)))
+    assert abs(closing[axis]) > 0.99
+    # So far that fingers 15 mm off the box's sides would be 3 mm inside the wall.
+    wall = bin_.X_WR.translation[axis] + bin_.size[axis] / 2 - bin_.wall
+    by = np.zeros(3)
+    by[axis] = wall - (scene.opening / 2 + 0.015 + bench.robot.gripper.pad[1]) + 0.003 - middle.X_WO.translation[axis]
+    shift = np.concatenate([by, np.zeros(4)])
+    beside = Placement(tuple(np.array(middle.release) + shift), tuple(np.array(middle.rest) + shift))
+    found = placed(beside)
+    assert found.sample == beside
+    opened = next(phase for phase in found.phases if phase.name == "open")
+    assert scene.opening < opened.opening < scene.opening + 0.03
+    let_go = replace(scene.moved("box", beside.X_WO), held=None, opening=opened.opening)
+    touching = pairs(bench.robot.hand_links, "box") | pairs("box", "right_bin")
+    assert bench.motion.free(let_go, opened.trajectory.end, touching, 0.0)
