@@ -11,7 +11,7 @@ from numba import njit
 from planner.motion.collision import JOINT_STEP, TRAVEL_STEP, FastChecker
 from planner.motion.kernels import edge_is_free
 from planner.motion.ompl_ import Query
-from planner.motion.shortcut import TRIES, shorten
+from planner.motion.shortcut import CUTS, shorten
 
 NODES = 4000
 
@@ -34,7 +34,7 @@ def plan_compiled(checker: FastChecker, query: Query, step: float) -> CompiledPa
     path = _plan(*ends, checker.packed, np.array(query.limits), step, rng)
     if not len(path):
         return None
-    return CompiledPath(path, shorten(path, rng.uniform(size=(TRIES, 3)), checker.packed)[0])
+    return CompiledPath(path, shorten(path, CUTS, checker.packed)[0])
 
 
 @njit(cache=True)

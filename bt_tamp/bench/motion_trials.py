@@ -96,7 +96,7 @@ def search(arena: Arena, planner: str, seed: int) -> Trial:
     found = time.thread_time()
     if path is None:
         return Trial(planner, found - started, 0.0, math.nan, math.nan)
-    short = shortened(path, checker, np.random.default_rng(seed))
+    short = shortened(path, checker)
     return Trial(planner, found - started, time.thread_time() - found, path_length(path), path_length(short))
 
 

@@ -190,6 +190,8 @@ def _corners(shape: Convex) -> np.ndarray:
 
 def _with_corners(rows: np.ndarray, shapes: Sequence[Convex]) -> np.ndarray:
     """The corners (n,3) of all shapes, and in `rows` where each shape's begin."""
+    if not any(isinstance(shape, Hull) for shape in shapes):
+        return _NO_CORNERS
     tables = [_corners(shape) for shape in shapes]
     rows[:, FIRST] = np.cumsum([0, *(len(table) for table in tables[:-1])])
     return np.concatenate([_NO_CORNERS, *tables])

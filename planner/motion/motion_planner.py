@@ -288,7 +288,7 @@ class MotionPlanner:
     ) -> np.ndarray | None:
         """A path, made shorter."""
         path = plan_path(query, checker, self._path_settings, is_hopeless)
-        return None if path is None else shortened(path, checker, np.random.default_rng(query.seed))
+        return None if path is None else shortened(path, checker)
 
     def _checker(self, scene: SceneState, ends: Ends) -> tuple[CollisionChecker, list[np.ndarray]]:
         """The fast model with the goals it accepts; the exact one if the fast refuses the start or every goal."""

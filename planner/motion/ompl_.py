@@ -5,9 +5,11 @@ the checker. The budget ends a planner through the condition's own `terminate`, 
 edge check: a Python condition would be asked between, at a cost, and from other threads.
 """
 
+import atexit
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from ompl import base, geometric, util
@@ -91,16 +93,17 @@ def path_length(path: np.ndarray) -> float:
 class _Edges(base.MotionValidator):
     """Asks the checker about configurations and whole edges, and ends the search when its budget is spent."""
 
-    def __init__(
-        self,
-        information: base.SpaceInformation,
-        checker: CollisionChecker,
-        max_checks: int,
-        end: base.PlannerTerminationCondition,
-    ) -> None:
+    def __init__(self, information: base.SpaceInformation) -> None:
         super().__init__(information)
+
+    def begin(self, checker: CollisionChecker, max_checks: int, end: base.PlannerTerminationCondition) -> None:
+        """From now on ask this checker, and terminate `end` once it has looked at so many configurations."""
         self._checker, self._end = checker, end
         self._last = checker.checks + max_checks
+
+    def end(self) -> None:
+        """Let go of them."""
+        del self._checker, self._end
 
     def is_free(self, state: Any) -> bool:
         """May the arm be there?"""
@@ -117,18 +120,42 @@ class _Edges(base.MotionValidator):
         return True
 
 
-def _search(
-    query: Query, checker: CollisionChecker, settings: PathSettings, seed: int, max_checks: int
-) -> np.ndarray | None:
-    util.RNG.setSeed(seed % (2**31 - 1) + 1)
-    space = base.RealVectorStateSpace(7)
-    space.setBounds(_bounds(query.limits))
+class _Space(NamedTuple):
+    """What OMPL searches, and who answers it there."""
+
+    space: base.RealVectorStateSpace
+    information: base.SpaceInformation
+    edges: _Edges
+
+
+@lru_cache(maxsize=16)
+def _space(lower: tuple[float, ...], upper: tuple[float, ...]) -> _Space:
+    """Made once for all queries: OMPL takes as long to set it up as to solve an easy one."""
+    space = base.RealVectorStateSpace(len(lower))
+    bounds = base.RealVectorBounds(len(lower))
+    for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
+        bounds.setLow(k, low)
+        bounds.setHigh(k, high)
+    space.setBounds(bounds)
     information = base.SpaceInformation(space)
-    end = base.plannerNonTerminatingCondition()
-    edges = _Edges(information, checker, max_checks, end)
+    edges = _Edges(information)
     information.setStateValidityChecker(edges.is_free)
     information.setMotionValidator(edges)
     information.setup()
+    return _Space(space, information, edges)
+
+
+# OMPL's bindings complain about all that is still there when Python ends.
+atexit.register(_space.cache_clear)
+
+
+def _search(
+    query: Query, checker: CollisionChecker, settings: PathSettings, seed: int, max_checks: int
+) -> np.ndarray | None:
+    space, information, edges = _space(*map(tuple, query.limits.tolist()))
+    util.RNG.setSeed(seed % (2**31 - 1) + 1)
+    end = base.plannerNonTerminatingCondition()
+    edges.begin(checker, max_checks, end)
     problem = base.ProblemDefinition(information)
     problem.addStartState(_state(space, query.start))
     goals = base.GoalStates(information)
@@ -143,6 +170,7 @@ def _search(
     planner.setProblemDefinition(problem)
     planner.setup()
     planner.solve(end)
+    edges.end()
     if not problem.hasExactSolution():
         return None
     solution: Any = problem.getSolutionPath()
@@ -157,14 +185,6 @@ def _from_start(path: np.ndarray, start: np.ndarray, checker: CollisionChecker) 
     if np.array_equal(path[-1], start):
         return path[::-1]
     return np.stack([start, path[-1]]) if checker.edge_is_free(start, path[-1]) else None
-
-
-def _bounds(limits: np.ndarray) -> base.RealVectorBounds:
-    bounds = base.RealVectorBounds(7)
-    for k in range(7):
-        bounds.setLow(k, float(limits[0, k]))
-        bounds.setHigh(k, float(limits[1, k]))
-    return bounds
 
 
 def _state(space: base.RealVectorStateSpace, q: np.ndarray) -> Any:

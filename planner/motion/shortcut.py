@@ -7,7 +7,8 @@ from planner.motion.checking import CollisionChecker
 from planner.motion.collision import JOINT_STEP, TRAVEL_STEP, FastChecker
 from planner.motion.kernels import edge_is_free
 
-TRIES = 48
+CUTS = np.random.default_rng(0).uniform(size=(48, 3))
+"""Where the cuts lie, see `shorten`: at random, but the same for all paths (drawing takes longer than cutting)."""
 
 GOOD = 1.1
 """Times the straight way, which nothing undercuts: a path no longer than that is short enough."""
@@ -16,16 +17,16 @@ WORTH = 0.01
 """Part of the path's length that a shortcut must save for its edge to be looked at."""
 
 
-def shortened(path: np.ndarray, checker: CollisionChecker, rng: np.random.Generator, tries: int = TRIES) -> np.ndarray:
-    """Leave out waypoints of the path (n,7) where the way round them is free, then cut corners, `tries` at most, until
-    it is short enough.
+def shortened(path: np.ndarray, checker: CollisionChecker, cuts: np.ndarray = CUTS) -> np.ndarray:
+    """Leave out waypoints of the path (n,7) where the way round them is free, then try the `cuts` (k,3) of corners
+    until it is short enough.
 
-    A corner is cut from somewhere on the two edges before it to somewhere on the two after it, at random (compare
+    A corner is cut from somewhere on the two edges before it to somewhere on the two after it, see `shorten` (compare
     Geraerts, Overmars: Creating high-quality paths for motion planning, 2007). The exact model, a hundred times slower,
     is not asked about any.
     """
     if isinstance(checker, FastChecker):
-        points, checks = shorten(np.array(path, dtype=float), rng.uniform(size=(tries, 3)), checker.packed)
+        points, checks = shorten(np.array(path, dtype=float), cuts, checker.packed)
         checker.checks += checks
         return points
     kept, i = [path[0]], 0
@@ -39,24 +40,24 @@ def shortened(path: np.ndarray, checker: CollisionChecker, rng: np.random.Genera
 
 
 @njit(cache=True)
-def shorten(path, parts, packed):
-    """The path (n,7) made shorter, and the number of configurations checked; parts (k,3), from 0 to 1: which corner
-    each of the cuts is at, and how far before and after it the cut ends."""
+def shorten(path, cuts, packed):
+    """The path (n,7) made shorter, and the number of configurations checked; cuts (k,3), from 0 to 1: which corner each
+    is at, and how far before and after it the cut ends."""
     # Room for what the cuts add: two points each at most.
-    points = np.empty((path.shape[0] + 2 * parts.shape[0], 7))
+    points = np.empty((path.shape[0] + 2 * cuts.shape[0], 7))
     points[: path.shape[0]] = path
     count, checks = _without_detours(points, path.shape[0], packed)
     way, tail = np.zeros(points.shape[0]), np.empty_like(points)
     enough = GOOD * np.sqrt(np.sum((path[-1] - path[0]) ** 2))
-    for n in range(parts.shape[0]):
+    for n in range(cuts.shape[0]):
         for i in range(1, count):
             way[i] = way[i - 1] + np.sqrt(np.sum((points[i] - points[i - 1]) ** 2))
         length = way[count - 1]
         if count == 2 or length <= enough:
             break
-        corner = 1 + int(parts[n, 0] * (count - 2))
-        first = way[corner] - parts[n, 1] * (way[corner] - way[max(corner - 2, 0)])
-        second = way[corner] + parts[n, 2] * (way[min(corner + 2, count - 1)] - way[corner])
+        corner = 1 + int(cuts[n, 0] * (count - 2))
+        first = way[corner] - cuts[n, 1] * (way[corner] - way[max(corner - 2, 0)])
+        second = way[corner] + cuts[n, 2] * (way[min(corner + 2, count - 1)] - way[corner])
         i = min(np.searchsorted(way[:count], first, side="right"), count - 1) - 1
         j = min(np.searchsorted(way[:count], second, side="right"), count - 1) - 1
         if i == j:

@@ -151,11 +151,8 @@ class Margins:
 
     def within_robot(self, own: Sequence[Pair]) -> np.ndarray:
         """Margins (n,) between pairs of the robot's own parts (or one and the held body); −inf where allowed."""
-        margins = np.zeros(len(own))
-        if self.allowed or self.relaxed:
-            for k, pair in enumerate(own):
-                margins[k] = self._of(pair, 0.0)
-        return margins
+        special = self.allowed.union(self.relaxed)
+        return np.array([self._of(pair, 0.0) if pair in special else 0.0 for pair in own])
 
     def _of(self, pair: Pair, default: float) -> float:
         if pair in self.allowed:
