@@ -13,6 +13,7 @@ from bt_tamp.disturb.disorders import disordered
 from bt_tamp.disturb.faulty import ExhaustedMotionPlanner, FailingSolver, FailingTaskPlanner
 from bt_tamp.disturb.names import CLASSES
 from bt_tamp.disturb.robot import moved_unseen
+from bt_tamp.disturb.world import can_topple
 from bt_tamp.executive.seams import Seams
 from planner.refinement import Phase
 from planner.task.symbols import GroundAction
@@ -78,9 +79,24 @@ def _stroking(to_come: Prospect) -> bool:
 
 def _before_tool(to_come: Prospect) -> bool:
     """Is a tool still to be taken up?"""
+    return any(body.tool for body in _untouched(to_come))
+
+
+def _before_pick(to_come: Prospect) -> bool:
+    """Is anything still to be taken up?"""
+    return bool(_untouched(to_come))
+
+
+def _before_tall(to_come: Prospect) -> bool:
+    """Is anything still to be taken up that can lie flatter than it stands?"""
+    return any(can_topple(body, body.X_WO.rotation) for body in _untouched(to_come))
+
+
+def _untouched(to_come: Prospect) -> list[Body]:
+    """What is to be taken up, and the hand isn't at it yet."""
     picked = [action.args[0] for action in to_come.later if action.name == "pick"]
     is_taken = to_come.phase.kind in ("open", "close") or to_come.phase.held is not None
-    return any(to_come.scenario.bodies[name].tool for name in picked[1 if is_taken else 0 :])
+    return [to_come.scenario.bodies[name] for name in picked[1 if is_taken else 0 :]]
 
 
 def _unchanged(scenario: Scenario) -> Scenario:
@@ -140,8 +156,8 @@ def _failing_task_planner(rng: np.random.Generator, strike: Strike) -> Seams:
 
 KINDS: dict[str, Kind] = {
     "moved": Kind(world.moved),
-    "rotated": Kind(world.rotated),
-    "toppled": Kind(world.toppled),
+    "rotated": Kind(world.rotated, _before_pick),
+    "toppled": Kind(world.toppled, _before_tall),
     "taken-and-returned": Kind(world.taken_and_returned),
     "new-object": Kind(partial(world.new_one, name=STRAY), amend=partial(with_late, _STRAY, "bin")),
     "new-crumb": Kind(partial(world.new_one, name=CRUMB), amend=partial(with_late, _CRUMB, "dustpan")),

@@ -34,6 +34,9 @@ SLIPPERY = 1.0
 DROPPING = 1.0
 """Seconds after which, at most, what has slipped in the hand falls from it."""
 
+TALL = 1.3
+"""Times its smallest extent: what is higher stands."""
+
 AWAY = (2.0, 5.0)
 """Seconds for which something is gone."""
 
@@ -62,7 +65,8 @@ def rotated(now: Occasion) -> Deed | None:
 
 def toppled(now: Occasion) -> Deed | None:
     """An object that stands is laid on its side."""
-    standing = [name for name in _on_table(now) if _stands(now, name)]
+    bodies, poses = now.scenario.bodies, now.truth.poses
+    standing = [name for name in _on_table(now) if can_topple(bodies[name], poses[name].rotation)]
     for name in _shuffled(now, standing):
         X_WO = now.truth.poses[name]
         for _ in range(10):
@@ -72,6 +76,12 @@ def toppled(now: Occasion) -> Deed | None:
             if spot is not None:
                 return _put(now, name, spot, f"{name} was toppled")
     return None
+
+
+def can_topple(body: Body, rotation: np.ndarray) -> bool:
+    """Could a body that is turned so lie flatter than it stands? A tool is not asked to."""
+    height = height_above(body.shape, rotation) + depth_below(body.shape, rotation)
+    return body.tool is None and height > TALL * float(min(extents(body.shape)))
 
 
 def taken_and_returned(now: Occasion) -> Deed | None:
@@ -147,7 +157,7 @@ def knocked_from_hand(now: Occasion) -> Deed | None:
         rotation = now.scenario.bodies[name].X_WO.rotation
         spot = now.spot(now.scenario.bodies[name], rotation, around, (0.05, far))
         if spot is not None:
-            return _put(now, name, spot, f"{name} was knocked from the hand")
+            return replace(_put(now, name, spot, f"{name} was knocked from the hand"), is_certain=True)
     return None
 
 
@@ -311,12 +321,6 @@ def _on_the_way(now: Occasion) -> set[str]:
 
 def _goal_bodies(now: Occasion) -> set[str]:
     return {fact.args[0] for fact in now.machine.agenda.goal if fact.args}
-
-
-def _stands(now: Occasion, name: str) -> bool:
-    body, R = now.scenario.bodies[name], now.truth.poses[name].rotation
-    height = height_above(body.shape, R) + depth_below(body.shape, R)
-    return not now.is_crumb(name) and body.tool is None and height > 1.3 * float(min(extents(body.shape)))
 
 
 def _between(X_WA: SE3, X_WB: SE3) -> float:

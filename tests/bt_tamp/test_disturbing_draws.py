@@ -1,16 +1,23 @@
 """What a class draws can be dealt with, as it declares."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from bt_tamp.disturb.classes import KINDS, Prospect
 from bt_tamp.disturb.deed import Occasion
-from bt_tamp.disturb.world import crumbs_beside_pan, moved
+from bt_tamp.disturb.world import crumbs_beside_pan, knocked_from_hand, moved
 from bt_tamp.executive.build import build
 from bt_tamp.options import RunOptions
 from planner.motion.motion_planner import MotionPlanner
+from planner.motion.trajectory import Trajectory
+from planner.refinement import Phase
+from planner.task.symbols import GroundAction
 from scenarios.document import parse_document
 from scenarios.generate import generate
 from scenarios.load import build_scenario, load_scenario
+from sim.scene import Held
 from skills.gathering import Place, strokes_for
 from skills.strokes import Crumbs, Tool, opening_of
 
@@ -43,3 +50,40 @@ def test_a_crumb_is_put_where_a_stroke_can_take_it(draw):
             found += 1
         machine.plant.close()
     assert found >= 10
+
+
+@pytest.mark.parametrize(
+    ("name", "left", "may_come"),
+    [
+        ("rotated", ("wipe(carrot)", "pick(box)"), True),
+        ("rotated", ("pick(box)", "place(box)"), True),
+        ("rotated", ("wipe(carrot)", "wipe(tomato)"), False),
+        ("toppled", ("pick(book)", "place(book)", "pick(box)"), True),
+        ("toppled", ("pick(book)", "place(book)", "pick(sponge)"), False),
+        ("sponge-far", ("pick(book)", "pick(sponge)"), True),
+        ("sponge-far", ("pick(book)", "place(book)"), False),
+    ],
+)
+def test_a_class_waits_for_no_phase_after_which_there_is_nothing_for_it_to_do(name, left, may_come):
+    scenario = load_scenario("fig1")
+    actions = tuple(GroundAction(text.partition("(")[0], (text[text.index("(") + 1 : -1],)) for text in left)
+    still = Phase("go", "move", Trajectory.standstill(np.zeros(7)), 0.1)
+    assert KINDS[name].fits(Prospect(still, actions, scenario)) is may_come
+
+
+def test_what_the_fingers_are_about_to_close_on_is_not_to_come():
+    scenario = load_scenario("fig1")
+    closing = Phase("close", "close", Trajectory.standstill(np.zeros(7)), 0.1)
+    assert not KINDS["rotated"].fits(Prospect(closing, (GroundAction("pick", ("box", "table")),), scenario))
+
+
+def test_what_is_knocked_from_the_hand_is_sure_to_matter():
+    machine = build(load_scenario("fig1"), RunOptions(), lambda kind, **data: None, lambda why: None)
+    seen, context = machine.plant.observe(), machine.context
+    context.scene = replace(context.scene, held=Held("box", machine.robot.X_WG(seen.q).inverse() * seen.poses["box"]))
+    now = Occasion(0.0, seen, machine, MotionPlanner(machine.robot), np.random.default_rng(0))
+    deed = knocked_from_hand(now)
+    machine.plant.close()
+    assert deed is not None
+    assert deed.names == ("box",)
+    assert deed.is_certain
