@@ -120,15 +120,20 @@ class Kind:
 
 
 def with_late(body: Body, to: str | None, scenario: Scenario) -> Scenario:
-    """The scene with one more body that comes late, wanted in the first region of kind `to` (None: nowhere)."""
-    goal = scenario.goal
-    if to is not None:
+    """The scene with one more body that comes late, wanted in the first region of kind `to` (None: nowhere).
+
+    A body that the scene knows already, as one that goes on from a disturbed run does, stays as it is.
+    """
+    goal = parse_goal(scenario.goal)
+    if to is not None and not any(body.name in names for _, names in goal):
         places = [region.name for region in scenario.regions.values() if region.kind == to]
         if not places:
             return scenario
-        goal = goal_text((*parse_goal(goal), ("in_bin", (body.name, places[0]))))
+        goal = (*goal, ("in_bin", (body.name, places[0])))
+    if body.name in scenario.bodies:
+        return replace(scenario, goal=goal_text(goal))
     bodies = {**scenario.bodies, body.name: body}
-    return replace(scenario, bodies=bodies, goal=goal, late=scenario.late | {body.name})
+    return replace(scenario, bodies=bodies, goal=goal_text(goal), late=scenario.late | {body.name})
 
 
 def _box(name: str, size: tuple[float, float, float], mass: float) -> Body:

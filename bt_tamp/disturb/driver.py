@@ -167,7 +167,9 @@ class Driver:
         return max(phase.trajectory.duration, STILL_PHASE) if phase is not None else STILL_PHASE
 
     def _look_at_the_clock(self, t: float) -> None:
-        for coming in [one for one in self._coming if one.due is not None and one.due <= t]:
+        # One in a step: the next is to see what became of the world by this one.
+        coming = next((one for one in self._coming if one.due is not None and one.due <= t), None)
+        if coming is not None:
             self._do(coming, t)
         if self._trials and t >= self._look_again:
             self._look_for_consequences(t)

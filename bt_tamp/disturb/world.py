@@ -112,10 +112,12 @@ def taken_for_good(now: Occasion) -> Deed | None:
 
 
 def new_one(now: Occasion, name: str) -> Deed | None:
-    """The late body `name` appears on the table: the goal is about it as well."""
-    centre = now.scenario.table.X_WT.translation[:2]
-    spot = now.spot(now.scenario.bodies[name], np.eye(3), centre, (0.0, 0.35))
-    if spot is None or name in now.truth.poses:
+    """The late body `name`, if the scene has a place for it, appears on the table: the goal is about it as well."""
+    body, centre = now.scenario.bodies.get(name), now.scenario.table.X_WT.translation[:2]
+    if body is None or name in now.truth.poses:
+        return None
+    spot = now.spot(body, np.eye(3), centre, (0.0, 0.35))
+    if spot is None:
         return None
     return Deed(f"{name} appeared on the table", (Brought(start=now.t, name=name, X_WO=spot),), names=(name,))
 

@@ -30,7 +30,7 @@ def state_of(machine: Machine) -> RunState:
         poses={name: tuple(pin.SE3ToXYZQUAT(X).tolist()) for name, X in seen.poses.items()},
         regions={name: tuple(pin.SE3ToXYZQUAT(X).tolist()) for name, X in seen.regions.items()},
         goal=goal_text((fact.predicate, fact.args) for fact in sorted(machine.agenda.order)),
-        late=tuple(sorted(machine.agenda.unseen)),
+        late=tuple(sorted(machine.agenda.unseen - seen.poses.keys())),
     )
 
 

@@ -41,8 +41,8 @@ class RunState:
             raise ValueError(f"not a run's state: {error}") from None
 
     def gone(self, scenario: Scenario) -> tuple[str, ...]:
-        """Bodies of the scenario that should be there and are not."""
-        return tuple(name for name in scenario.bodies if name not in self.poses and name not in self.late)
+        """Bodies of the scenario that should be there and are not; its late ones need not be."""
+        return tuple(name for name in scenario.bodies if name not in self.poses and name not in scenario.late)
 
     def applied(self, scenario: Scenario) -> Scenario:
         """The scenario as it stands in this state. Raises ValueError if it is of another scene."""
