@@ -210,20 +210,29 @@ class SearchThenSample:
             found = shared_out(found, domain, problem)
         work.add("expansions", found.expansions)
         plan = [str(action) for action in found.actions] if isinstance(found, TaskPlan) else None
-        event = {"round": number, "domain": texts[0], "problem": texts[1], "plan": plan}
+        failure = "" if isinstance(found, TaskPlan) else self._failure(found)
+        event = {"round": number, "domain": texts[0], "problem": texts[1], "plan": plan, "failure": failure}
         kind = "round" if learned is self.learned else "proof_sought"
         self._report(kind, {**event, "expansions": found.expansions})
         return problem, found
+
+    def _failure(self, found: NoTaskPlan) -> str:
+        """Why it isn't known whether there is a plan; "" if there is none."""
+        return found.failure or (
+            "" if found.exhausted else f"no plan within {self._settings.max_expansions} expansions"
+        )
 
     def _solved(self, domain: str, problem: str, stated: Problem) -> TaskPlan | NoTaskPlan:
         """What the task planner says, its own failure or a plan that doesn't work taken for finding none."""
         try:
             found = self._task_planner.solve(domain, problem, self._settings.max_expansions)
+            if not isinstance(found, TaskPlan | NoTaskPlan):
+                return NoTaskPlan(False, 0, f"it answered {found!r}")
+            wrong = flaw(found, stated.init, stated.goal) if isinstance(found, TaskPlan) else None
         except PddlError:
             raise
         except Exception as error:  # Whatever goes wrong in a planner, the arm is in the middle of something.
             return NoTaskPlan(False, 0, f"{type(error).__name__}: {error}")
-        wrong = flaw(found, stated.init, stated.goal) if isinstance(found, TaskPlan) else None
         return found if wrong is None else NoTaskPlan(False, found.expansions, f"its plan does not work: {wrong}")
 
     def _learn_from(self, stuck: Stuck, rest: tuple[Step, ...], rng: np.random.Generator, work: Work) -> None:

@@ -10,9 +10,9 @@ def sentence(event: Event) -> str | None:
         case "run_started":
             return f"{data['scene']}, seed {data['seed']}: planning (a first run compiles too; times are the robot's)"
         case "round":
-            return f"round {data['round']}: {_proposal(data['plan'])}"
+            return f"round {data['round']}: {planner_failed(event) or _proposal(data['plan'])}"
         case "proof_sought":
-            return _proof(data["plan"])
+            return planner_failed(event) or _proof(data["plan"])
         case "refinement_failed":
             return f"{data['action']} can't be done like this: {data['reason']}{in_the_way(event)}"
         case "backtracked":
@@ -48,6 +48,12 @@ def in_the_way(event: Event) -> str:
     """The culprits of a failure, to be put after its reason; nothing without culprits."""
     culprits = event.data.get("culprits") or ()
     return f"; in the way: {', '.join(culprits)}" if culprits else ""
+
+
+def planner_failed(event: Event) -> str:
+    """That the task planner failed in a round, which says nothing about the goal; "" if it didn't."""
+    failure = event.data.get("failure")
+    return f"the task planner failed ({failure})" if failure else ""
 
 
 def counted(number: int, what: str) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from bt_tamp.report.events import Event
 from bt_tamp.report.result import RunResult
-from bt_tamp.report.sentences import counted, in_the_way
+from bt_tamp.report.sentences import counted, in_the_way, planner_failed
 
 WIDTH = 100
 
@@ -46,15 +46,18 @@ class _Teller:
             self._proposed = None
             self._heading(f"Planning, at {event.t:.1f} s" if self._plans else "Planning before the first motion")
         plan = data["plan"]
-        lead = f"Round {data['round']}: "
-        if plan is None:
+        lead, failed = f"Round {data['round']}: ", planner_failed(event)
+        if failed:
+            self._say(f"{lead}{failed}.")
+        elif plan is None:
             self._say(f"{lead}with what had been learned, no sequence of actions led to the goal.")
         else:
             self._say(f"{lead}{_proposal(plan, self._proposed)}")
             self._proposed = plan
 
     def _proof_sought(self, event: Event, data: Any) -> None:
-        self._say(_by_proofs(data["plan"]), "  - ")
+        failed = planner_failed(event)
+        self._say(f"By proofs alone: {failed}." if failed else _by_proofs(data["plan"]), "  - ")
 
     def _refinement_failed(self, event: Event, data: Any) -> None:
         self._say(f"{data['action']} could not be worked out: {data['reason']}{in_the_way(event)}.", "  - ")

@@ -3,6 +3,7 @@ import pytest
 from bt_tamp.report.events import Event, read_events
 from bt_tamp.report.live import PlainLines, watcher
 from bt_tamp.report.result import PressedMotion, RunResult, UnintendedContact
+from bt_tamp.report.sentences import sentence
 from bt_tamp.report.story import WIDTH, story
 
 FIRST = ["pick(book, table)", "place(book, crate)"]
@@ -44,6 +45,16 @@ RESULT = RunResult(
     unintended_contacts=(UnintendedContact(1.0, "finger", "vase", 3.25, "drag(book, table)", "descend"),),
     pressed=(PressedMotion("drag(book, table)", 8.0, 8.1, 0.2, 9.5),),
 )
+
+
+def test_a_task_planner_that_failed_is_not_taken_for_one_that_found_the_goal_out_of_reach() -> None:
+    failed = {"round": 1, "plan": None, "expansions": 0, "failure": "MemoryError: too much"}
+    events = [EVENTS[0], Event("round", 0.1, failed), Event("proof_sought", 0.1, failed)]
+    told = " ".join(story(events, None).split())
+    assert "Round 1: the task planner failed (MemoryError: too much)." in told
+    assert "By proofs alone: the task planner failed (MemoryError: too much)." in told
+    assert "no sequence of actions" not in told
+    assert sentence(events[1]) == "round 1: the task planner failed (MemoryError: too much)"
 
 
 def test_the_story_tells_plans_failures_lessons_deeds_and_end_in_their_order() -> None:

@@ -51,7 +51,15 @@ def planned(task_planner, skill, scene):
     return loop.plan(scene, GOAL, np.random.default_rng(0), Work())
 
 
-@pytest.mark.parametrize("spoil", [crash, without_its_first_step])
+def nothing_at_all(_):
+    return None
+
+
+def steps_that_are_none(found):
+    return replace(found, steps=(None,)) if isinstance(found, TaskPlan) else found
+
+
+@pytest.mark.parametrize("spoil", [crash, without_its_first_step, nothing_at_all, steps_that_are_none])
 def test_a_task_planner_that_fails_once_is_asked_again(spoil, tabletop, stand_in):
     outcome = planned(Faulty(spoil, 1), stand_in(lambda *_: None), tabletop("cup"))
     assert isinstance(outcome, Solution)
