@@ -74,6 +74,7 @@ class PhaseLeaf(Behaviour):
         return self.watch() if stop is None else self.refuse(ArmStopped, str(stop))
 
     def terminate(self, new_status: Status) -> None:
+        self._context.phase = None
         if new_status == Status.INVALID:
             self._context.controller.hold()
 

@@ -116,3 +116,15 @@ def test_the_open_loop_baseline_ends_where_its_plan_fails(tmp_path):
     result = RunResult.from_json((tmp_path / "run" / "result.json").read_text())
     assert result.reason.startswith("open loop: pick(sponge, dustpan) failed")
     assert result.replans == 0
+
+
+def test_a_motion_that_was_broken_off_is_not_judged_by_the_arm_that_stands_and_waits(tmp_path):
+    (tmp_path / "scene.yaml").write_text(
+        scenario_path("fig3").read_text()
+        + "disturbances: [{phase: descend, action: drag, disorder: {what: pose-missing, seconds: 40}}]\n"
+    )
+    run = ["run", str(tmp_path / "scene.yaml"), "--max-sim-time", "9", "--out", str(tmp_path / "run")]
+    assert main(run) == 12
+    result = RunResult.from_json((tmp_path / "run" / "result.json").read_text())
+    assert result.replans == 1
+    assert all(motion.peak_n > 1.0 for motion in result.pressed)
