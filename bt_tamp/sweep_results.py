@@ -11,7 +11,7 @@ from typing import Any
 
 from bt_tamp.disturb.names import CLASSES, can_be_reached, chosen
 from bt_tamp.report.result import RunResult
-from bt_tamp.sweep_store import Stored
+from bt_tamp.sweep_store import UNFINISHED, Stored
 
 Z95 = 1.959964
 """Standard deviations within which 95 % of a normal distribution lie."""
@@ -48,7 +48,7 @@ class Run:
     @property
     def is_met(self) -> bool:
         """Did what was to befall it befall it, and matter? A run that broke before it could tell counts as one."""
-        if self.disturb == UNDISTURBED or self.result is None:
+        if self.disturb == UNDISTURBED or self.result is None or self.outcome in UNFINISHED:
             return True
         return any(one.mattered for one in self.result.disturbances)
 
@@ -61,7 +61,8 @@ class Run:
 
 @dataclass(frozen=True)
 class Line:
-    """The runs of one scene and class: `runs` and everything else are of those that were met, `unmet` counts the rest.
+    """The runs of one scene and class: `runs` and everything else are of those that were met, `unmet` counts the rest;
+    but no run may break a limit: peak_n and violations are of all.
 
     interval: 95 % of the success rate, by Wilson. lost_s: median of robot time beyond that of the undisturbed run of
     the same scene and seed, both having succeeded; lost_actions: the same as a multiple of the action that was undone.
@@ -157,6 +158,7 @@ def lines(runs: Sequence[Run]) -> list[Line]:
 def _line(key: tuple[str, str, bool], runs: Sequence[Run], usual: Mapping[tuple, Run]) -> Line:
     met = [run for run in runs if run.is_met]
     results = [run.result for run in met if run.result is not None]
+    every = [run.result for run in runs if run.result is not None]
     succeeded = sum(run.succeeded for run in met)
     lost, shares = [], []
     for run in met:
@@ -178,9 +180,9 @@ def _line(key: tuple[str, str, bool], runs: Sequence[Run], usual: Mapping[tuple,
         reacted_s=_median(reactions),
         slow_reacted_s=at_95(reactions),
         reactions=len(reactions),
-        peak_n=max((max(result.peak_force_n, result.peak_contact_force_n) for result in results), default=None),
-        violations=sum(result.torque_limit_violations + result.unlawful_commands for result in results),
-        crashes=sum(run.outcome in ("crashed", "killed") for run in met),
+        peak_n=max((max(result.peak_force_n, result.peak_contact_force_n) for result in every), default=None),
+        violations=sum(result.torque_limit_violations + result.unlawful_commands for result in every),
+        crashes=sum(run.outcome in UNFINISHED for run in met),
         unmet=len(runs) - len(met),
         reasons=tuple(failed.most_common()),
     )

@@ -2,6 +2,7 @@
 
 import csv
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -72,6 +73,25 @@ def test_a_run_that_nothing_befell_that_matters_is_neither_success_nor_failure(s
         opened.add(Finished(Job("fig2", RunOptions(seed=5, disturb=("moved",))), "crashed", "broken", None))
     line = table(store)["moved", True]
     assert (line.runs, line.succeeded, line.unmet) == (5, 3, 1)
+
+
+def test_a_run_that_crashed_before_anything_befell_it_is_a_failure(store):
+    with SweepStore(store) as opened:
+        opened.add(finished(3, 2.0, (), "crashed", "KeyError"))
+        broken = finished(4, 2.0, ("push",), "crashed", "KeyError: 'x'", mattered=False)
+        opened.add(broken)
+    line = table(store)["push", True]
+    assert (line.runs, line.succeeded, line.crashes, line.unmet) == (1, 0, 1, 0)
+    assert line.reasons == (("crashed: KeyError: 'x'", 1),)
+
+
+def test_the_peak_is_that_of_all_runs_whether_something_befell_them_or_not(store):
+    struck = finished(5, 20.0, ("moved",), mattered=False)
+    data = RunResult.from_json(struck.result)
+    with SweepStore(store) as opened:
+        opened.add(replace(struck, result=replace(data, peak_force_n=77.0, unlawful_commands=2).to_json()))
+    line = table(store)["moved", True]
+    assert (line.peak_n, line.violations, line.unmet) == (77.0, 2, 1)
 
 
 def test_the_slowest_in_twenty_is_left_out_of_95_percent():
