@@ -205,7 +205,8 @@ class Driver:
     def _carry_out(self, coming: _Coming, deed: Deed, now: Occasion) -> None:
         assert self._plant is not None
         self._tell(coming.name, deed)
-        if not deed.is_certain:
+        # What concerns nothing in the world changes nothing in it; what the robot itself moves meanwhile doesn't count.
+        if not deed.is_certain and (deed.names or deed.goal is not None):
             self._trials.append(Trial.of(self._told - 1, deed, now))
             self._look_again = now.t + HAIR
         for fault in deed.faults:
