@@ -41,6 +41,9 @@ Strike = Callable[[], None]
 Amend = Callable[[Scenario], Scenario]
 """The scene with what will come late."""
 
+EARLY = 0.3
+"""Share of a stroke after which the hand takes up the room where something could still be put."""
+
 SPELLS = 12
 """How often the controller's solver fails for a while."""
 
@@ -110,11 +113,13 @@ def _real(rng: np.random.Generator, strike: Strike) -> Seams:
 @dataclass(frozen=True)
 class Kind:
     """A class. draw: one instance (None: it is software that fails, by `seams`); fits: the phases in which it may come;
-    while_planning: may it also fall into planning? amend: brings what is needed into the scene."""
+    while_planning: may it also fall into planning? latest: share of a phase in which it comes; amend: brings what is
+    needed into the scene."""
 
     draw: Draw | None = None
     fits: Fits = _always
     while_planning: bool = True
+    latest: float = 1.0
     amend: Amend = _unchanged
     seams: Callable[[np.random.Generator, Strike], Seams] = field(default=_real)
 
@@ -166,8 +171,10 @@ KINDS: dict[str, Kind] = {
     "taken-and-returned": Kind(world.taken_and_returned),
     "new-object": Kind(partial(world.new_one, name=STRAY), amend=partial(with_late, _STRAY, "bin")),
     "new-crumb": Kind(partial(world.new_one, name=CRUMB), amend=partial(with_late, _CRUMB, "dustpan")),
-    "path-blocked": Kind(partial(world.path_blocked, name=POST), _moving, False, partial(with_late, _POST, None)),
-    "stroke-blocked": Kind(partial(world.path_blocked, name=POST), _stroking, False, partial(with_late, _POST, None)),
+    "path-blocked": Kind(partial(world.path_blocked, name=POST), _moving, False, amend=partial(with_late, _POST, None)),
+    "stroke-blocked": Kind(
+        partial(world.path_blocked, name=POST), _stroking, False, EARLY, amend=partial(with_late, _POST, None)
+    ),
     "knocked-from-hand": Kind(world.knocked_from_hand, _holding, False),
     "slipping": Kind(world.slipping, _holding, False),
     "sponge-far": Kind(world.sponge_far, _before_tool),

@@ -7,8 +7,10 @@ import numpy as np
 from pinocchio import SE3
 
 from bt_tamp.executive.build import Machine
+from planner.motion.collision import part_names
 from planner.motion.motion_planner import MotionPlanner
-from planner.refinement import Phase
+from planner.motion.world import obstacles
+from planner.refinement import Phase, pairs
 from planner.task.symbols import Fact, GroundAction
 from scenarios.checks import immovable
 from scenarios.goal import is_crumb
@@ -157,16 +159,19 @@ class Occasion:
 
     def stands_free(self, body: Body, X_WO: SE3) -> bool:
         """Can a body be put at X_WO without overlapping anything, the arm and what it holds included?"""
-        others = [
+        around = [
             body_solid(self.scenario.bodies[name], X) for name, X in self.truth.poses.items() if name != body.name
         ]
-        if overlap_problem(body_solid(body, X_WO), [*immovable(self.scenario), *others]) is not None:
+        if overlap_problem(body_solid(body, X_WO), [*immovable(self.scenario), *around]) is not None:
             return False
         scene = self.scene
         if scene.held is not None and scene.held.name == body.name:
             scene = replace(scene, held=None)
         alone = replace(scene.moved(body.name, X_WO), poses={body.name: X_WO, **_held_pose(scene)})
-        return self.motion.free(alone, self.truth.q, margin=CLEARANCE)
+        # What the arm or what it holds touches besides, a sponge the table in a stroke, is no matter here.
+        mine = frozenset(part_names(self.machine.robot, scene.held))
+        others = frozenset(obstacle.name for obstacle in obstacles(alone)) - {body.name}
+        return self.motion.free(alone, self.truth.q, pairs(mine, others), CLEARANCE)
 
     def spot(self, body: Body, rotation: np.ndarray, around: np.ndarray, distances: tuple[float, float]) -> SE3 | None:
         """A free place on the table for a body turned so: its distance (m) in the plane from `around` (2,) within

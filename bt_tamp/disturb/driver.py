@@ -81,7 +81,7 @@ class Driver:
             kind, rng = KINDS[name], self._stream(name)
             if kind.draw is None:
                 continue
-            coming = _Coming(name, kind.draw, rng, kind=kind, share=float(rng.uniform()))
+            coming = _Coming(name, kind.draw, rng, kind=kind, share=kind.latest * float(rng.uniform()))
             if kind.while_planning and rng.uniform() < WHILE_PLANNING:
                 coming.due = float(rng.uniform(0.05, 0.3))
             self._coming.append(coming)
@@ -192,7 +192,7 @@ class Driver:
 
     def _do(self, coming: _Coming, t: float) -> None:
         now = self._occasion(t, coming.rng)
-        deed = coming.draw(now)
+        deed = coming.draw(now) if _is_fit(coming.kind, now) else None
         if deed is None:
             coming.tries += 1
             coming.due = t + AGAIN
@@ -233,3 +233,8 @@ class Driver:
             and (deed.is_in_the_way or not frozenset(running.args).isdisjoint(deed.names)),
             shifts={fault.region: fault.by for fault in deed.faults if isinstance(fault, BinShifted)},
         )
+
+
+def _is_fit(kind: Kind | None, now: Occasion) -> bool:
+    """May it come now? What found nothing to do in the phase it was drawn for comes in another of its kind."""
+    return kind is None or now.phase is None or kind.fits(Prospect(now.phase, now.left, now.scenario))

@@ -37,6 +37,11 @@ DROPPING = 1.0
 TALL = 1.3
 """Times its smallest extent: what is higher stands."""
 
+SOON = 0.4
+AHEAD = 15
+"""Seconds ahead, at least, and at how many spots, at which a motion is blocked: a hand in a slow stroke takes up much
+of what lies before it."""
+
 AWAY = (2.0, 5.0)
 """Seconds for which something is gone."""
 
@@ -130,9 +135,8 @@ def path_blocked(now: Occasion, name: str) -> Deed | None:
     body, passed = now.scenario.bodies[name], controller.time_in_reference
     z = now.table_height() + depth_below(body.shape, np.eye(3)) + 5e-4
     robot = now.machine.robot
-    for ahead in now.rng.permutation(np.linspace(0.4, 2.0, 9)):
-        t = passed + float(ahead)
-        if t > phase.trajectory.duration:
+    for t in now.rng.permutation(np.linspace(passed + SOON, phase.trajectory.duration, AHEAD)).tolist():
+        if t < passed + SOON:
             continue
         p = robot.X_WG(phase.trajectory.at(t)[0]).translation
         X_WO = SE3(np.eye(3), np.array([p[0], p[1], z]))

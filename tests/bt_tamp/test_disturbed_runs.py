@@ -136,3 +136,11 @@ def test_what_the_robot_moves_itself_is_no_consequence_of_eyes_that_fail(tmp_pat
     blind, moved = RunResult.from_json((tmp_path / "run" / "result.json").read_text()).disturbances
     assert (blind.phase, blind.mattered) == ("drag", False)
     assert moved.mattered
+
+
+@pytest.mark.parametrize("scene, phase", [("fig2", "stroke"), ("fig3", "drag")])
+def test_a_stroke_is_blocked_while_it_presses_and_nothing_else_is(scene, phase, tmp_path):
+    run = ["run", scene, "--disturb", "stroke-blocked", "--max-sim-time", "9", "--out", str(tmp_path / "run")]
+    assert main(run) == 12
+    (blocked,) = RunResult.from_json((tmp_path / "run" / "result.json").read_text()).disturbances
+    assert (blocked.phase, blocked.answer) == (phase, "action_failed")
