@@ -13,7 +13,7 @@ from bt_tamp.disturb.disorders import disordered
 from bt_tamp.disturb.faulty import ExhaustedMotionPlanner, FailingSolver, FailingTaskPlanner
 from bt_tamp.disturb.names import CLASSES
 from bt_tamp.disturb.robot import moved_unseen
-from bt_tamp.disturb.world import can_topple
+from bt_tamp.disturb.world import can_topple, has_corners
 from bt_tamp.executive.seams import Seams
 from planner.refinement import Phase
 from planner.task.symbols import GroundAction
@@ -85,9 +85,9 @@ def _before_tool(to_come: Prospect) -> bool:
     return any(body.tool for body in _untouched(to_come))
 
 
-def _before_pick(to_come: Prospect) -> bool:
-    """Is anything still to be taken up?"""
-    return bool(_untouched(to_come))
+def _before_cornered(to_come: Prospect) -> bool:
+    """Is anything still to be taken up that lies otherwise once it is turned on the spot?"""
+    return any(has_corners(body, body.X_WO.rotation) for body in _untouched(to_come))
 
 
 def _before_tall(to_come: Prospect) -> bool:
@@ -166,7 +166,7 @@ def _failing_task_planner(rng: np.random.Generator, strike: Strike) -> Seams:
 
 KINDS: dict[str, Kind] = {
     "moved": Kind(world.moved),
-    "rotated": Kind(world.rotated, _before_pick),
+    "rotated": Kind(world.rotated, _before_cornered),
     "toppled": Kind(world.toppled, _before_tall),
     "taken-and-returned": Kind(world.taken_and_returned),
     "new-object": Kind(partial(world.new_one, name=STRAY), amend=partial(with_late, _STRAY, "bin")),

@@ -12,7 +12,7 @@ from pinocchio import SE3
 from bt_tamp.disturb.deed import BEHIND, DRAWS, Deed, Later, Occasion
 from planner.task.symbols import Fact
 from scenarios.scenario import Body, Region
-from scenarios.shapes import extents
+from scenarios.shapes import Cylinder, Sphere, extents
 from scenarios.solids import body_solid, region_hull, table_solid
 from scenarios.standing import overlap_problem
 from sim.robot_faults import SlipperyPads
@@ -27,6 +27,9 @@ NEAR = (0.04, 0.15)
 
 STRAY = 0.05
 """Metres by which a shifted bin may come nearer to the robot or go further away."""
+
+UPRIGHT = 0.99
+"""Cosine of the angle with the vertical within which a cylinder stands."""
 
 SLIPPERY = 1.0
 """Seconds for which something slips."""
@@ -57,13 +60,15 @@ def moved(now: Occasion) -> Deed | None:
 
 
 def rotated(now: Occasion) -> Deed | None:
-    """An object is turned on the spot."""
-    for name in _shuffled(now, [name for name in _on_table(now) if not now.is_crumb(name)]):
-        X_WO = now.truth.poses[name]
+    """An object that isn't the same again afterwards is turned on the spot."""
+    bodies, poses = now.scenario.bodies, now.truth.poses
+    cornered = [name for name in _on_table(now) if has_corners(bodies[name], poses[name].rotation)]
+    for name in _shuffled(now, [name for name in cornered if not now.is_crumb(name)]):
+        X_WO = poses[name]
         for _ in range(10):
             angle = now.rng.uniform(np.radians(30.0), np.radians(90.0)) * now.rng.choice([-1.0, 1.0])
             turned = SE3(_about_z(angle) @ X_WO.rotation, X_WO.translation + np.array([0.0, 0.0, 5e-4]))
-            if now.stands_free(now.scenario.bodies[name], turned):
+            if now.stands_free(bodies[name], turned):
                 return _put(now, name, turned, f"{name} was turned by {np.degrees(angle):.0f}°")
     return None
 
@@ -81,6 +86,13 @@ def toppled(now: Occasion) -> Deed | None:
             if spot is not None:
                 return _put(now, name, spot, f"{name} was toppled")
     return None
+
+
+def has_corners(body: Body, rotation: np.ndarray) -> bool:
+    """Does a body that is turned so lie otherwise once it is turned about the vertical? A can that stands does not, nor
+    does a ball."""
+    shape = body.shape
+    return not (isinstance(shape, Sphere) or (isinstance(shape, Cylinder) and abs(rotation[2, 2]) > UPRIGHT))
 
 
 def can_topple(body: Body, rotation: np.ndarray) -> bool:

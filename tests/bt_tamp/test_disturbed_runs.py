@@ -138,7 +138,7 @@ def test_what_the_robot_moves_itself_is_no_consequence_of_eyes_that_fail(tmp_pat
     assert moved.mattered
 
 
-@pytest.mark.parametrize("scene, phase", [("fig2", "stroke"), ("fig3", "drag")])
+@pytest.mark.parametrize(("scene", "phase"), [("fig2", "stroke"), ("fig3", "drag")])
 def test_a_stroke_is_blocked_while_it_presses_and_nothing_else_is(scene, phase, tmp_path):
     run = ["run", scene, "--disturb", "stroke-blocked", "--max-sim-time", "9", "--out", str(tmp_path / "run")]
     assert main(run) == 12

@@ -7,7 +7,7 @@ import pytest
 
 from bt_tamp.disturb.classes import KINDS, Prospect
 from bt_tamp.disturb.deed import Occasion
-from bt_tamp.disturb.world import crumbs_beside_pan, knocked_from_hand, moved
+from bt_tamp.disturb.world import crumbs_beside_pan, knocked_from_hand, moved, rotated
 from bt_tamp.executive.build import build
 from bt_tamp.options import RunOptions
 from planner.motion.motion_planner import MotionPlanner
@@ -16,6 +16,7 @@ from planner.refinement import Phase
 from planner.task.symbols import GroundAction
 from scenarios.document import parse_document
 from scenarios.generate import generate
+from scenarios.library import scenario_path
 from scenarios.load import build_scenario, load_scenario
 from sim.scene import Held
 from skills.gathering import Place, strokes_for
@@ -87,3 +88,16 @@ def test_what_is_knocked_from_the_hand_is_sure_to_matter():
     assert deed is not None
     assert deed.names == ("box",)
     assert deed.is_certain
+
+
+@pytest.mark.parametrize(
+    ("shape", "is_turned"), [("{cylinder: {radius: 0.033, height: 0.12}}", False), ("{box: [0.05, 0.06, 0.07]}", True)]
+)
+def test_what_is_round_is_not_turned_on_the_spot(shape, is_turned):
+    text = scenario_path("fig3").read_text().replace("{box: [0.16, 0.22, 0.03]}", shape)
+    machine = build(
+        build_scenario(parse_document(text, "fig3")), RunOptions(), lambda kind, **data: None, lambda why: None
+    )
+    now = Occasion(0.0, machine.plant.observe(), machine, MotionPlanner(machine.robot), np.random.default_rng(0))
+    assert (rotated(now) is not None) == is_turned
+    machine.plant.close()
