@@ -28,7 +28,7 @@ GOAL_TIME = 0.5
 """Seconds for which the goal must hold, everything at rest."""
 
 TOLD_AFTER = 1.0
-"""Seconds of waiting for rest after which it is told what is waited for."""
+"""Seconds of waiting, for rest or for what is nowhere to be seen, after which it is told what is waited for."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class GoalReached(Behaviour):
         super().__init__("goal reached?")
         self._agenda, self._context = agenda, context
         self._since: float | None = None
-        self._told = False
+        self._told = self._told_missing = False
         self.restless: tuple[float, tuple[str, ...]] | None = None
         self.waits: tuple[float, tuple[str, ...]] | None = None
 
@@ -95,9 +95,13 @@ class GoalReached(Behaviour):
         scene = self._context.scene
         if not missing or not self._agenda.pursued(scene) <= facts:
             self.waits = None
+            self._told_missing = False
             return
         since = self.waits[0] if self.waits else now
         self.waits = (since, self._agenda.missing(scene))
+        if self.waits[1] and not self._told_missing and now - since > TOLD_AFTER:
+            self._told_missing = True
+            self._context.report("missing", bodies=list(self.waits[1]))
 
 
 class PlanStillGood(Behaviour):

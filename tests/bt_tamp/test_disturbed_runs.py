@@ -144,3 +144,12 @@ def test_a_stroke_is_blocked_while_it_presses_and_nothing_else_is(scene, phase, 
     assert main(run) == 12
     (blocked,) = RunResult.from_json((tmp_path / "run" / "result.json").read_text()).disturbances
     assert (blocked.phase, blocked.answer) == (phase, "action_failed")
+
+
+def test_the_story_tells_that_the_arm_waited_for_what_is_gone(tmp_path, capsys):
+    (tmp_path / "scene.yaml").write_text(
+        scenario_path("fig3").read_text() + "disturbances: [{at: 0.1, take: {object: box}}]\n"
+    )
+    assert main(["run", str(tmp_path / "scene.yaml"), "--out", str(tmp_path / "run")]) == 11
+    assert main(["explain", str(tmp_path / "run")]) == 0
+    assert "The arm waited for box to turn up again." in " ".join(capsys.readouterr().out.split())
