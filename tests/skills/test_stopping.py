@@ -86,7 +86,7 @@ def test_a_plan_dropped_in_the_middle_of_a_stroke_lifts_the_sponge_off_before_an
     assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
     context, lift = bench.context, LiftOff(bench.context)
     act = bench.skills["wipe"].subtree(ActionRun(action("wipe(carrot, table, dustpan)")), context)
-    while context.phase.name != "stroke" or context.controller.contact_force < 5.0:
+    while (phase := context.phase) is None or phase.name != "stroke" or context.controller.contact_force < 5.0:
         act.tick_once()
         bench.run(TICKS_PER_TREE)
     lift.tick_once()
