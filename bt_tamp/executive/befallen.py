@@ -13,8 +13,8 @@ ANSWERS = ("refined_again", "action_failed", "replan", "rebuilt")
 class Ledger:
     """Told of every event of a run, and at every tick whether the arm stands still.
 
-    An action that something befell has answered when it is worked out anew or fails; it has reacted when the arm
-    stands still or sets out anew after that. What comes after the action's end answers to something else.
+    An action that something befell has answered when it is worked out anew or fails, so it did matter; it has reacted
+    when the arm stands still or sets out anew after that. What comes after the action's end answers to something else.
     """
 
     def __init__(self) -> None:
@@ -61,7 +61,8 @@ class Ledger:
         for index, one in enumerate(self._found):
             if one.answer:
                 continue
-            self._found[index] = replace(one, answer=kind, answered_after_s=t - one.t)
+            mattered = one.mattered or one.is_urgent
+            self._found[index] = replace(one, answer=kind, answered_after_s=t - one.t, mattered=mattered)
             if one.is_urgent:
                 self._reacting.append(index)
 

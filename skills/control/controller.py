@@ -31,6 +31,12 @@ LOST_AFTER = 0.014
 LOST_AFTER_TOUCH = 0.25
 """The same while touching down, when the tool may bounce."""
 
+BORNE = 0.2
+"""Share of a regulated force from which something bears it: what slides up between the fingers still rubs a little."""
+
+UNBORNE_FOR = 0.04
+"""Seconds without anything that bears it after which a pressed reference has lost contact."""
+
 PRESSED_SETTLING = 0.1
 """Seconds that the force is left to settle after it was ramped up."""
 
@@ -97,7 +103,7 @@ class ArmController:
         self._tau: np.ndarray | None = None
         self._pressed = self._presses = False
         self._anchor = 0.0
-        self._without_contact = 0.0
+        self._without_contact = self._unborne = 0.0
         self._slowed = 1.0
         self._unexplained: np.ndarray | None = None
         self.contact_lost = False
@@ -317,7 +323,7 @@ class ArmController:
 
     def _press(self, reference: Reference, state: ArmState, keep_loop: bool) -> None:
         self._pressed = True
-        self._without_contact = 0.0
+        self._without_contact = self._unborne = 0.0
         self._anchor = float(reference.normal @ state.p)
         if not keep_loop:
             self._loop.reset(max(along(reference.normal, self._wrench.raw), 0.0))
@@ -334,9 +340,17 @@ class ArmController:
                 self._press(reference, state, keep_loop=False)
             return
         self._without_contact = 0.0 if self._touch.closed else self._without_contact + self._period
-        if self._without_contact > (LOST_AFTER_TOUCH if reference.until_contact else LOST_AFTER):
+        self._unborne = 0.0 if self._is_borne(reference) else self._unborne + self._period
+        patience = LOST_AFTER_TOUCH if reference.until_contact else LOST_AFTER
+        if self._without_contact > patience or self._unborne > UNBORNE_FOR:
             self.contact_lost = True
             self._begin_hold(state)
+
+    def _is_borne(self, reference: Reference) -> bool:
+        """Does something bear the force that is regulated, as far as that can be told yet?"""
+        if reference.mode != "hybrid" or self._loop.time_since_ramp < PRESSED_SETTLING:
+            return True
+        return along(reference.normal, self._wrench.raw) >= BORNE * reference.force
 
     def _law(self) -> Law:
         """What is asked for at this instant."""

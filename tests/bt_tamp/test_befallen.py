@@ -45,6 +45,14 @@ def test_a_deed_matters_once_its_consequence_was_seen():
     assert [one.mattered for one in ledger.found] == [False, True]
 
 
+def test_what_made_the_action_fail_that_it_befell_mattered():
+    ledger = Ledger()
+    disturbed(ledger, 1.0, mattered=False, is_urgent=True)
+    disturbed(ledger, 1.0, mattered=False)
+    ledger.hear("action_failed", 1.1, {})
+    assert [one.mattered for one in ledger.found] == [True, False]
+
+
 def test_actions_that_came_to_their_end_tell_how_long_they_took():
     ledger = Ledger()
     for kind, t in (("action_started", 1.0), ("action_failed", 2.0), ("action_started", 3.0), ("action_done", 7.0)):

@@ -79,6 +79,10 @@ class Rig:
         """True normal force in N between a body and the table."""
         return sum(c.normal_force for c in self.plant.contacts() if {c.first, c.second} == {name, "table"})
 
+    def touching(self) -> set[tuple[str, str]]:
+        """Pairs of what touches in truth."""
+        return {(c.first, c.second) for c in self.plant.contacts()}
+
 
 class Steps:
     """The largest change of a torque between two ticks that were watched, in Nm."""

@@ -86,3 +86,18 @@ def test_a_slide_without_contact_is_lost_at_once(lab):
     assert rig.controller.contact_lost
     rig.controller.follow(Reference(Trajectory.standstill(lab.home, 1.0)))
     assert not rig.controller.contact_lost
+
+
+def test_a_sponge_that_slides_up_between_the_fingers_bears_no_more_and_the_arm_holds_before_they_meet_the_table(lab):
+    rig = lab.gripped_sponge(0.6, -0.2, 0.01)
+    lower = lab.straight(rig.q, [0.0, 0.0, -0.02], 0.03)
+    rig.follow(Reference(lower, "hybrid", force=FORCE, until_contact=True))
+    rig.controller.follow(Reference(lab.straight(rig.q, [0.0, 0.3, 0.0], 0.1), "hybrid", force=FORCE))
+    rig.run(1.0)
+    assert not rig.controller.contact_lost
+    height = rig.position[2]
+    rig.plant.set_pad_friction(0.002)
+    struck = rig.run(0.5, lambda _: any("table" in pair and "sponge" not in pair for pair in rig.touching()))
+    assert rig.controller.contact_lost
+    assert not any(struck)
+    assert height - rig.position[2] < 0.005
