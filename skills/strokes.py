@@ -9,7 +9,7 @@ in their way stands in its way too.
 Points are (2,) in W, metres; angles in rad about z of W.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,12 @@ began to rock and crept up in the hand."""
 
 CHORD = np.radians(7.5)
 """Turn between two poses on an arc: below the 10° at which a line stops at its corners."""
+
+CLEAR = 0.01
+"""Metres beyond all that a stroke sweeps from which a crumb is lost for certain."""
+
+HEAPED = 0.05
+"""Metres before the front to which crumbs may be pushed by others."""
 
 ROUNDING = 1e-9
 """Metres by which legs overlap, lest a point where they join be missed."""
@@ -86,6 +92,22 @@ class Stroke:
         straight = [start] if self.first > 0.0 else []
         return [*straight, bend, *arc, leave, end]
 
+    def after(self, way: float) -> "Stroke":
+        """What is left of the stroke once the front has gone `way` metres."""
+        start, bend, leave, _ = self.legs
+        past_bend = way - self.first
+        past_arc = past_bend - abs(self.turn) * self.radius
+        if past_bend < 0.0:
+            return replace(self, start=_point(start[0] + way * along(self.heading)), first=-past_bend)
+        if past_arc >= 0.0:
+            begin = _point(leave[0] + past_arc * along(leave[1]))
+            return Stroke(begin, leave[1], max(self.last - past_arc, 0.0))
+        side = float(np.sign(self.turn))
+        turned = side * past_bend / self.radius
+        heading = self.heading + turned
+        begin = _point(bend[0] + side * self.radius * (left(self.heading) - left(heading)))
+        return Stroke(begin, heading, self.last, 0.0, self.turn - turned, self.radius)
+
     def met(self, points: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """When and where the front comes upon points (n,2) that lie within `reach` of its middle.
 
@@ -117,6 +139,10 @@ class Stroke:
 def _straight(points: np.ndarray, start: np.ndarray, heading: float) -> tuple[np.ndarray, np.ndarray]:
     offset = points - start
     return offset @ along(heading), offset @ left(heading)
+
+
+def _point(p: np.ndarray) -> tuple[float, float]:
+    return float(p[0]), float(p[1])
 
 
 def along(heading: float) -> np.ndarray:
@@ -238,3 +264,16 @@ def crossing_of(stroke: Stroke, opening: Opening, lateral: np.ndarray) -> tuple[
     pace = float(along(heading) @ opening.inward)
     way = (opening.middle - points) @ opening.inward / pace
     return (points + way[:, None] * along(heading) - opening.middle) @ opening.across, way
+
+
+def is_lost(rest: Stroke, tool: Tool, opening: Opening, point: np.ndarray, radius: float) -> bool:
+    """Is a crumb at a point (2,), of a radius in metres, for certain none that the rest of a stroke takes along?
+
+    What has passed the opening isn't lost, nor what lies beneath the sponge or in a heap before it.
+    """
+    offset = point - opening.middle
+    is_through = offset @ opening.inward >= -radius and abs(offset @ opening.across) <= opening.half_width + radius
+    room = radius + CLEAR
+    further = replace(rest, last=rest.last + HEAPED)
+    when = float(further.met(point[None], tool.span / 2 + room)[0][0])
+    return not is_through and not (np.isfinite(when) and when >= -tool.depth - room)

@@ -30,6 +30,7 @@ from skills.pressing import Pressing, in_order
 from skills.refine import PathFree, Refine
 from skills.skill import ContactSettings, Toolkit, Unfit, refine_by_sampling
 from skills.strokes import Crumbs, Opening, Stroke, Tool, along, left, opening_of, top_of
+from skills.taken_out import CrumbInStroke
 from skills.way_search import find_way
 from skills.waypoints import raised, shifted
 from skills.ways import Legs, Line, Way
@@ -122,7 +123,6 @@ class Wipe:
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
         crumb, _, pan = refinement.action.args[:3]
         after = replace(scene, q=refinement.phases[-1].trajectory.end)
-        assert scene.held is not None
         place = self._place(scene, scene.held, refinement.action)
         assert place is not None
         mask = place.taken(refinement.sample.stroke, surely=False)
@@ -136,11 +136,12 @@ class Wipe:
     def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:
         motion = self._kit.motion
         reach = sequence("to the table", Follow("pre-wipe", run, context), Follow("approach", run, context))
+        in_stroke = CrumbInStroke(run, context, lambda scene: self._place(scene, scene.held, run.action))
         contact = sequence("in contact", Touch("descend", run, context), Slide("stroke", run, context))
         wiping = sequence(
             "stroke with the sponge",
             guarded("reach", Refine(run, context, motion), reach),
-            guarded("watched", PathFree(run, context, motion), contact),
+            guarded("watched", PathFree(run, context, motion), guarded("pushed", in_stroke, contact)),
             Follow("retract", run, context),
         )
         crumb, _, pan = run.action.args[:3]
@@ -150,8 +151,10 @@ class Wipe:
             Achieved(lambda scene: place_of(scene, crumb) == pan, run, context),
         )
 
-    def _place(self, scene: SceneState, held: Held, action: GroundAction) -> Place | None:
-        """What is seen to be swept in a scene; None if nothing can enter the dustpan."""
+    def _place(self, scene: SceneState, held: Held | None, action: GroundAction) -> Place | None:
+        """What is seen to be swept in a scene; None if nothing can enter the dustpan, or nothing is held."""
+        if held is None:
+            return None
         crumb, surface, pan = action.args[:3]
         scenario = scene.scenario
         opening = opening_of(scenario.regions[pan], scenario.table)

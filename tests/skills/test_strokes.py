@@ -10,7 +10,7 @@ from pinocchio import SE3
 
 from scenarios.scenario import Region, Table
 from skills.gathering import Place, bent_strokes, cover, fewest, strokes_for
-from skills.strokes import CHORD, EDGE, Crumbs, Stroke, Tool, along, left, opening_of, taken
+from skills.strokes import CHORD, EDGE, Crumbs, Stroke, Tool, along, is_lost, left, opening_of, taken
 
 TABLE = Table((0.44, 0.68, 0.05), SE3(np.eye(3), np.array([0.62, 0.06, 0.025])), 0.5)
 PAN = Region("pan", "dustpan", (0.20, 0.15, 0.055), 0.01, SE3(np.eye(3), np.array([0.68, -0.355, -0.0075])), 0.5, "+y")
@@ -71,6 +71,49 @@ def test_a_bent_course_turns_little_by_little_and_never_leaves_its_heading(headi
         assert abs(after - before) <= CHORD + 1e-9
         way = (q - p) / np.linalg.norm(q - p)
         assert way @ along((before + after) / 2) == pytest.approx(1.0)
+
+
+@settings(derandomize=True, max_examples=60, deadline=None)
+@given(headings, lengths, lengths, turns, st.floats(0.06, 0.15), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_what_is_left_of_a_stroke_ends_where_the_whole_one_does(heading, first, last, turn, radius, gone, share):
+    stroke = Stroke((0.5, 0.1), heading, last, first, turn, radius)
+    way = gone * stroke.length
+    rest = stroke.after(way)
+    assert rest.length == pytest.approx(stroke.length - way)
+    front, _ = stroke_at(stroke, way + share * (stroke.length - way))
+    met, _ = rest.met(front[None], 1e-6)
+    assert met[0] == pytest.approx(share * (stroke.length - way), abs=1e-6)
+    for whole, left_over in zip(stroke.legs[3], rest.legs[3], strict=True):
+        assert np.allclose(whole, left_over)
+
+
+def test_only_what_the_rest_of_a_stroke_can_no_longer_take_is_lost():
+    opening = opening_of(PAN, TABLE)
+    assert opening is not None
+    rest = Stroke((0.68, 0.25), -np.pi / 2, 0.54).after(0.2)
+
+    def lost(x: float, y: float) -> bool:
+        return is_lost(rest, TOOL, opening, np.array([x, y]), 0.01)
+
+    far_ahead, pushed, beneath, at_its_side, in_the_pan = (
+        (0.64, -0.2),
+        (0.69, 0.04),
+        (0.68, 0.08),
+        (0.74, 0.03),
+        (0.7, -0.4),
+    )
+    assert not any(lost(*p) for p in (far_ahead, pushed, beneath, at_its_side, in_the_pan))
+    behind, beside, ahead_beside, beside_the_pan = (0.68, 0.15), (0.78, 0.03), (0.58, -0.1), (0.5, -0.4)
+    assert all(lost(*p) for p in (behind, beside, ahead_beside, beside_the_pan))
+
+
+def test_what_lies_beside_a_stroke_now_is_not_lost_if_it_bends_that_way_later():
+    opening = opening_of(PAN, TABLE)
+    assert opening is not None
+    bent = Stroke((0.5, -0.05), 0.0, 0.2, 0.1, -np.pi / 2, 0.08)
+    point = np.array([0.68, -0.2])
+    assert not is_lost(bent.after(0.05), TOOL, opening, point, 0.01)
+    assert is_lost(Stroke((0.55, -0.05), 0.0, 0.25), TOOL, opening, point, 0.01)
 
 
 def test_a_crumb_whose_way_leads_past_the_opening_is_not_taken():

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import pytest
 from bench import Bench, action, scene_with, with_pose
 from pinocchio import SE3
 from py_trees.common import Status
@@ -225,3 +226,46 @@ def test_a_crumb_moved_while_the_sponge_comes_down_is_not_wiped_for_where_it_was
     assert status is Status.FAILURE
     assert isinstance(bench.context.failure, SceneChanged)
     assert bench.context.failure.reason == "carrot was moved"
+
+
+def wiped_while(share: float, disturb: Callable[[Bench], None]) -> tuple[Bench, Status, float]:
+    """The carrot wiped, disturbed in the stroke; how it went, and the seconds from then to its end."""
+    bench = Bench(with_pose(scene_with("carrot", "sponge"), "carrot", 0.66, 0.08))
+    assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
+    since: list[float] = []
+
+    def do() -> None:
+        disturb(bench)
+        since.append(bench.context.observation.t)
+
+    status = carried_out(bench, "wipe(carrot, table, dustpan)", "stroke", share, do)
+    return bench, status, bench.context.observation.t - since[0]
+
+
+@pytest.mark.parametrize("by", [(0.0, 0.2), (-0.12, -0.1)])
+def test_a_stroke_ends_at_once_when_its_crumb_is_put_out_of_it(by):
+    bench, status, passed = wiped_while(0.2, lambda bench: shifted(bench, "carrot", *by)())
+    assert status is Status.FAILURE
+    assert isinstance(bench.context.failure, SceneChanged)
+    assert bench.context.failure.reason == "carrot was moved"
+    assert passed < 0.15
+
+
+def test_a_stroke_ends_at_once_when_its_crumb_is_taken_away():
+    bench, status, passed = wiped_while(0.2, lambda bench: bench.plant.take_away("carrot"))
+    assert status is Status.FAILURE
+    assert isinstance(bench.context.failure, SceneChanged)
+    assert bench.context.failure.reason == "carrot is gone"
+    assert passed < 0.2
+
+
+def test_a_crumb_put_elsewhere_before_the_sponge_is_wiped_all_the_same():
+    bench, status, _ = wiped_while(0.2, lambda bench: shifted(bench, "carrot", 0.02, -0.1)())
+    assert status is Status.SUCCESS, bench.context.failure
+
+
+def test_a_crumb_put_into_the_dustpan_by_someone_else_does_not_end_the_stroke():
+    bench, status, _ = wiped_while(
+        0.2, lambda bench: bench.plant.put("carrot", bench.scene.scenario.regions["dustpan"].X_WR)
+    )
+    assert status is Status.SUCCESS, bench.context.failure

@@ -103,7 +103,7 @@ def test_what_was_missed_is_wiped_again():
 
     def put_behind(ticks: int) -> None:
         run(ticks)
-        if bench.context.phase is not None and bench.context.phase.name == "stroke":
+        if bench.context.phase is not None and bench.context.phase.name == "retract":
             bench.plant.put("carrot", X_WO)
             bench.run = run
 
