@@ -7,6 +7,8 @@ import numpy as np
 from pinocchio import SE3
 
 from planner.failure import MotionFailure
+from planner.motion.answers import Asked, believed
+from planner.motion.motion_planner import MotionPlanner
 from planner.motion.passing import passing
 from planner.motion.timing import haste
 from planner.motion.trajectory import Trajectory
@@ -73,11 +75,12 @@ def find_way(
         failure = next((check for check in checks if check is not None), None)
         if failure:
             continue
-        reach = motion.move(scene, [legs[0][0]], allowed)
+        goals = [legs[0][0]]
+        reach = believed(motion, motion.move(scene, goals, allowed), Asked(scene, scene.q, goals, allowed))
         if isinstance(reach, MotionFailure):
             failure = reach
             continue
-        timed = [motion.timed_line(line.scene, line.path, line.speed, line.allowed, line.checked) for line in lines]
+        timed = [_timed(motion, line) for line in lines]
         failure = next((line for line in timed if isinstance(line, MotionFailure)), None)
         if failure is None:
             reach = carried(toolkit.robot, reach, scene.held)
@@ -90,6 +93,12 @@ def find_way(
             known.keep(way)
             return way
     return failure or Unfit("the arm can't follow the hand's path")
+
+
+def _timed(motion: MotionPlanner, line: Line) -> Trajectory | MotionFailure:
+    until = None if line.checked is None else line.path[line.checked - 1]
+    answer = motion.timed_line(line.scene, line.path, line.speed, line.allowed, line.checked)
+    return believed(motion, answer, Asked(line.scene, line.path[0], [line.path[-1]], line.allowed, until))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from pinocchio import SE3
@@ -19,6 +19,7 @@ from planner.motion.ik import ClosedFormIK
 from planner.motion.ik_numeric import track_numerically
 from planner.motion.lines import CartesianPath, interpolate, track
 from planner.motion.ompl_ import PathSettings, Query, path_length, plan_path
+from planner.motion.recent import Recent
 from planner.motion.shortcut import shortened
 from planner.motion.timing import time_line, time_path, time_path_with_stops
 from planner.motion.trajectory import Trajectory
@@ -40,9 +41,6 @@ FAR_ABOUT = 1.2
 
 _CONTROL_SPACINGS = (0.3, 0.1)
 _ATTEMPTS = 3
-_RECENT = 12
-
-_Model = TypeVar("_Model", bound=CollisionChecker)
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,8 @@ class MotionPlanner:
         self._seed, self._queries = seed, 0
         self._ik = ClosedFormIK(robot)
         self._limits = np.stack([robot.q_min, robot.q_max])
-        self._recent_exact, self._recent_fast = _Recent(ExactChecker), _Recent(FastChecker)
+        self._recent_exact, self._recent_fast = Recent(ExactChecker), Recent(FastChecker)
+        self._confirmed: tuple[SceneState, frozenset[Pair], Trajectory] | None = None
 
     def free(
         self, scene: SceneState, q: np.ndarray, allowed: frozenset[Pair] = NOTHING, margin: float | None = None
@@ -160,7 +159,17 @@ class MotionPlanner:
         if checked is not None and checked < len(path):
             q = q[: int(np.argmin(np.abs(q - path[checked - 1]).max(axis=1))) + 1]
         margins = self._leaving(scene, path[0], Margins(self.settings.audit_margin, allowed))
-        return self._audit(scene, q, margins) or trajectory
+        failure = self._audit(scene, q, margins)
+        if failure is None:
+            self._confirmed = scene, allowed, trajectory
+        return failure or trajectory
+
+    def has_confirmed(self, scene: SceneState, trajectory: Trajectory, allowed: frozenset[Pair] = NOTHING) -> bool:
+        """Is this the very motion that was confirmed last by the exact model, in this very scene?"""
+        if self._confirmed is None:
+            return False
+        known_scene, known_allowed, known = self._confirmed
+        return known is trajectory and known_scene is scene and known_allowed == allowed
 
     def audit(
         self,
@@ -335,6 +344,7 @@ class MotionPlanner:
         for timing in (*timings, lambda: time_path_with_stops(self.robot, path)):
             trajectory = timing()
             if self._audit(scene, trajectory.q, margins) is None:
+                self._confirmed = scene, margins.allowed, trajectory
                 return trajectory
         return None
 
@@ -370,23 +380,6 @@ class MotionPlanner:
 
     def _exact(self, scene: SceneState, margins: Margins) -> ExactChecker:
         return self._recent_exact.of(self.robot, scene, margins)
-
-
-class _Recent(Generic[_Model]):
-    """The collision models that were asked for last."""
-
-    def __init__(self, make: Callable[[RobotModel, SceneState, Margins], _Model]) -> None:
-        self._make = make
-        self._known: list[tuple[SceneState, Margins, _Model]] = []
-
-    def of(self, robot: RobotModel, scene: SceneState, margins: Margins) -> _Model:
-        """The model of this very scene with these margins."""
-        for known, limits, checker in self._known:
-            if known is scene and limits == margins:
-                return checker
-        checker = self._make(robot, scene, margins)
-        self._known = [(scene, margins, checker), *self._known[: _RECENT - 1]]
-        return checker
 
 
 def _relaxed(margins: Margins, near: Sequence[Contact]) -> Margins:

@@ -51,12 +51,18 @@ def with_pose(scenario: Scenario, name: str, x: float, y: float, yaw: float = 0.
 class Bench:
     """Carries out actions one after the other, each refined in the scene as it is observed."""
 
-    def __init__(self, scenario: Scenario, contact: str = "hybrid", seed: int = 0) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        contact: str = "hybrid",
+        seed: int = 0,
+        motion: type[MotionPlanner] = MotionPlanner,
+    ) -> None:
         self.robot = RobotModel(scenario.robot.model, scenario.robot.X_WB)
         self.plant = BulletPlant(scenario, self.robot)
         self._belief = Belief(scenario, self.robot)
         settings = ContactSettings(mode=contact)
-        self.motion = MotionPlanner(self.robot, seed)
+        self.motion = motion(self.robot, seed)
         self.skills = skills(Toolkit(self.robot, self.motion, settings))
         self._rng = np.random.default_rng(seed)
         observation = self.plant.observe()
