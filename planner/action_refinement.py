@@ -1,17 +1,21 @@
 """Refines one action, with what is known of it: what worked or was blocked by something now away is tried first."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from planner.crash import crash_of
 from planner.failure import Blocked, RefinementFailure
 from planner.refinement import Budget, Hints, Refinement, Refiners, Work
 from planner.task.learned import Learned
 from planner.task.situation import Situation, Spot
 from planner.task.symbols import GroundAction
 from sim.scene import SceneState
+
+Report = Callable[[str, Mapping[str, Any]], None]
+"""Takes an event's kind and its data."""
 
 MAX_WORKED = 4
 """Samples of an action that are kept because they worked, the latest first."""
@@ -20,9 +24,10 @@ MAX_WORKED = 4
 class ActionRefiner:
     """Refines single actions and remembers what worked where."""
 
-    def __init__(self, refiners: Refiners, learned: Learned) -> None:
+    def __init__(self, refiners: Refiners, learned: Learned, report: Report) -> None:
         self._refiners = refiners
         self._learned = learned
+        self._report = report
         self._refined: dict[tuple[GroundAction, bytes], Refinement] = {}
         self._worked: dict[tuple[GroundAction, Spot], tuple[Any, ...]] = {}
 
@@ -59,6 +64,9 @@ class ActionRefiner:
         tries = len(hints.first) + (budget.tries if is_fresh else 0)
         work.add("refinements")
         outcome = self._outcome(action, situation.scene, rng, replace(budget, tries=max(1, tries)), hints)
+        if outcome.crashes:
+            crashes = list(dict.fromkeys(outcome.crashes))
+            self._report("planner_crashed", {"action": str(action), "doing": "working out", "crashes": crashes})
         if isinstance(outcome, Refinement):
             self._refined[key] = outcome
             earlier = (sample for sample in self._worked.get(place, ()) if sample != outcome.sample)
@@ -71,12 +79,19 @@ class ActionRefiner:
         try:
             return self._refiners[action.name].refine(action, scene, rng, budget, hints)
         except Exception as error:  # Whatever goes wrong in a planner, the arm is in the middle of something.
-            reason = f"working it out failed ({type(error).__name__}: {error})"
-            return RefinementFailure(action, reason, (Blocked(None, reason),))
+            reason = f"working it out crashed, {crash_of(error)}"
+            return RefinementFailure(action, reason, (Blocked(None, reason),), crashes=(crash_of(error),))
 
-    def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
-        """The scene after the refined action went as meant."""
-        return self._refiners[refinement.action.name].predict(scene, refinement)
+    def predict(self, scene: SceneState, refinement: Refinement) -> SceneState | RefinementFailure:
+        """The scene after the refined action went as meant, or that foreseeing it crashed."""
+        action = refinement.action
+        try:
+            return self._refiners[action.name].predict(scene, refinement)
+        except Exception as error:
+            crash = crash_of(error)
+            self._report("planner_crashed", {"action": str(action), "doing": "foreseeing", "crashes": [crash]})
+            reason = f"foreseeing its outcome crashed, {crash}"
+            return RefinementFailure(action, reason, (Blocked(refinement.sample, reason),), crashes=(crash,))
 
 
 def _fingerprint(scene: SceneState) -> bytes:

@@ -42,10 +42,12 @@ class RefinementFailure(Failure):
 
     `proof` says that no sample can work, whatever the budget: "here" as long as the action's object
     lies where it lies (out of reach), "anywhere" wherever things lie (too heavy, region too small).
+    `crashes`: errors met on the way, each as a phrase.
     """
 
     attempts: tuple[Blocked, ...] = ()
     proof: Literal["here", "anywhere"] | None = None
+    crashes: tuple[str, ...] = ()
 
     @property
     def culprit_sets(self) -> frozenset[frozenset[str]]:

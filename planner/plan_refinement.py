@@ -4,22 +4,19 @@ Where an action fails because of a pose or grasp that the plan itself chose earl
 back to that choice, a bounded number of times, before the failure is held against the plan.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from planner.action_refinement import ActionRefiner
+from planner.action_refinement import ActionRefiner, Report
 from planner.failure import Blocked, RefinementFailure
 from planner.refinement import Budget, Refinement, Work
 from planner.task.facts import OBSERVED
 from planner.task.situation import Situation
 from planner.task.symbols import Fact, Step, TaskPlan, resume_at
 from sim.scene import SceneState
-
-Report = Callable[[str, Mapping[str, Any]], None]
-"""Takes an event's kind and its data."""
 
 
 @dataclass(frozen=True)
@@ -88,13 +85,20 @@ class PlanRefiner:
                 step.action, situation, rng, budget, work, avoid=avoid.get(depth, ())
             )
             if isinstance(outcome, Refinement):
-                after, resumed = self._after(plan, position, situation, outcome)
-                chosen.append(Chosen(position, _as_predicted(step, situation.facts, after.facts), outcome, situation))
-                if resumed is not None:
-                    self._report("refined", {"action": str(step.action)})
-                    situation, position = after, resumed
-                    continue
-                failure, targets = _spoiled(outcome, step.adds - after.facts), [depth]
+                seen = self._after(plan, position, situation, outcome)
+                if isinstance(seen, RefinementFailure):
+                    chosen.append(Chosen(position, step, outcome, situation))
+                    failure = seen
+                else:
+                    after, resumed = seen
+                    effects = _as_predicted(step, situation.facts, after.facts)
+                    chosen.append(Chosen(position, effects, outcome, situation))
+                    if resumed is not None:
+                        self._report("refined", {"action": str(step.action)})
+                        situation, position = after, resumed
+                        continue
+                    failure = _spoiled(outcome, step.adds - after.facts)
+                targets = [depth]
             else:
                 revised = pending.revised if pending is not None and pending.depth == depth else set[int]()
                 failure, targets = outcome, _targets(outcome, situation, chosen, revised)
@@ -125,9 +129,11 @@ class PlanRefiner:
 
     def _after(
         self, plan: TaskPlan, position: int, before: Situation, refinement: Refinement
-    ) -> tuple[Situation, int | None]:
+    ) -> tuple[Situation, int | None] | RefinementFailure:
         """The situation after a step, and the step to go on with (None: the rest of the plan no longer applies)."""
         scene = self._actions.predict(before.scene, refinement)
+        if isinstance(scene, RefinementFailure):
+            return scene
         kept = {fact for fact in plan.steps[position].apply(before.facts) if fact.predicate not in OBSERVED}
         facts = frozenset(kept) | self._state(scene)
         return before.after(refinement.action, scene, facts), resume_at(plan, facts, position + 1)

@@ -62,12 +62,14 @@ class Phase:
 
 @dataclass(frozen=True)
 class Refinement:
-    """An action made concrete in one scene: the sample that was chosen and the motion that does it."""
+    """An action made concrete in one scene: the sample that was chosen and the motion that does it. `crashes`: errors
+    met on the way, each as a phrase, that cost other samples."""
 
     action: GroundAction
     sample: Any
     phases: tuple[Phase, ...]
     checks: int = 0
+    crashes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

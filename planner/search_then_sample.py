@@ -12,9 +12,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from planner.action_refinement import ActionRefiner
+from planner.action_refinement import ActionRefiner, Report
 from planner.failure import ExecutionFailure, RefinementFailure, SceneChanged
-from planner.plan_refinement import PlanRefiner, RefinedPlan, Report, Stuck
+from planner.plan_refinement import PlanRefiner, RefinedPlan, Stuck
 from planner.refinement import Budget, Refinement, Refiners, Work
 from planner.sharing import shared_out
 from planner.task.compilation import with_constraints
@@ -102,7 +102,7 @@ class SearchThenSample:
         self._given = given
         self._settings = settings
         self._report = report
-        self._actions = ActionRefiner(refiners, self.learned)
+        self._actions = ActionRefiner(refiners, self.learned, report)
         self._plans = PlanRefiner(self._actions, self._state, settings.backtracks, report)
         self._budget = Budget(settings.tries, settings.motion_checks)
         self._samples: dict[GroundAction, tuple[Any, ...]] = {}

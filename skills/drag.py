@@ -145,9 +145,10 @@ class Drag:
         samples = search.pulls(body, in_order(pressings, hints)[0])
         nothing = f"{body.name} offers the fingertips no room, or comes to no edge within the arm's reach"
         outcome = refine_by_sampling(action, scene, samples, search.attempt, budget, hints, nothing)
+        crashes = (*outcome.crashes, *search.crashes)
         if isinstance(outcome, RefinementFailure) and search.second_best is not None:
-            return search.second_best
-        return outcome
+            return replace(search.second_best, crashes=crashes)
+        return replace(outcome, crashes=crashes)
 
     def predict(self, scene: SceneState, refinement: Refinement) -> SceneState:
         name = refinement.action.args[0]
@@ -175,7 +176,7 @@ class _Search:
     """One search for a drag: which ends have a grasp, and how often each edge has failed.
 
     A drag counts only if a grasp is found where it ends. What else can be moved aside may still be in that grasp's
-    way: then the drag is `second_best`, for when there is no better one.
+    way: then the drag is `second_best`, for when there is no better one. crashes: errors met in seeking grasps.
     """
 
     kit: Toolkit
@@ -184,6 +185,7 @@ class _Search:
     scene: SceneState
     rng: np.random.Generator
     second_best: Refinement | None = None
+    crashes: list[str] = field(default_factory=list)
     _failures: list[int] = field(default_factory=lambda: [0, 0, 0, 0])
     _grasps: dict[tuple[End, frozenset[str]], RefinementFailure | None] = field(default_factory=dict)
     _hopeless: set[End] = field(default_factory=set)
@@ -244,6 +246,7 @@ class _Search:
             picking = GroundAction(Pick.name, self.action.args[:2])
             there = replace(world.moved(self.action.args[0], X_WO_end), opening=0.0)
             found = self.pick.refine(picking, there, self.rng, GRASP_BUDGET, Hints())
+            self.crashes += found.crashes
             self._grasps[key] = found if isinstance(found, RefinementFailure) else None
         return self._grasps[key]
 

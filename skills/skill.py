@@ -12,6 +12,7 @@ import numpy as np
 from pinocchio import SE3
 from py_trees.behaviour import Behaviour
 
+from planner.crash import crash_of
 from planner.failure import Blocked, MotionFailure, RefinementFailure
 from planner.motion.motion_planner import MotionPlanner
 from planner.refinement import Budget, Hints, Pair, Phase, Refinement, Refiner
@@ -119,17 +120,26 @@ def refine_by_sampling(
 
     A sample that fails is tried again without the other movable bodies; if it works then, those
     of them that its motion would have hit are its culprits. One for which another's culprits and more have to go is
-    not looked into further: nothing would follow from it.
+    not looked into further: nothing would follow from it. An error in trying a sample fails that sample.
     """
+    crashes: dict[str, None] = {}
+
+    def tried(sample: Any, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
+        try:
+            return attempt(sample, world)
+        except Exception as error:  # A motion planner that crashes once may find the next sample's motion.
+            crashes[crash_of(error)] = None
+            return MotionFailure(f"working it out crashed, {crash_of(error)}")
+
     attempts: list[Blocked] = []
     counted = uncounted = 0
     reasons: dict[str, int] = {}
     for sample in _in_order(samples, hints):
-        outcome = attempt(sample, scene)
+        outcome = tried(sample, scene)
         if isinstance(outcome, tuple):
-            return Refinement(action, sample, outcome)
+            return Refinement(action, sample, outcome, crashes=tuple(crashes))
         known = [entry.culprits for entry in attempts if entry.culprits]
-        blocked = Blocked(sample, outcome.reason, _culprits(action, sample, scene, attempt, outcome, known))
+        blocked = Blocked(sample, outcome.reason, _culprits(action, sample, scene, tried, outcome, known))
         reasons[blocked.reason] = reasons.get(blocked.reason, 0) + 1
         if isinstance(outcome, Unfit) and not blocked.culprits:
             uncounted += 1
@@ -143,7 +153,7 @@ def refine_by_sampling(
     common = max(reasons, key=lambda reason: reasons[reason])
     total = counted + uncounted
     reason = f"none of {total} samples works, most often because {common}"
-    return RefinementFailure(action, reason, tuple(attempts) or (Blocked(None, common),))
+    return RefinementFailure(action, reason, tuple(attempts) or (Blocked(None, common),), crashes=tuple(crashes))
 
 
 def _in_order(samples: Iterable[Any], hints: Hints) -> Iterable[Any]:

@@ -1,13 +1,15 @@
-"""Every task plan that Pyperplan finds in a test is judged by a validator that isn't ours: unified-planning's."""
+"""Every task plan that Pyperplan finds in a test is judged by a validator that isn't ours: unified-planning's. What
+crashes in a test and is taken for a failure fails it."""
 
 import itertools
 import warnings
 from collections import OrderedDict
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import pytest
 
+from planner import crash
 from planner.task.pddl import OBJECT, Domain, Parameter, Problem
 from planner.task.pddl_reader import read_domain, read_problem
 from planner.task.primitives import ground, own_parameters, primitive
@@ -27,6 +29,22 @@ def _plans_are_valid(monkeypatch: pytest.MonkeyPatch) -> None:
         return found
 
     monkeypatch.setattr(PyperplanPlanner, "solve", validated)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_crashes_unseen(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """An error that planning takes for a failure is still an error, unless the test is about such."""
+    crashes: list[Exception] = []
+    place_of = crash.place_of
+
+    def noticed(error: Exception) -> str:
+        crashes.append(error)
+        return place_of(error)
+
+    monkeypatch.setattr(crash, "place_of", noticed)
+    yield
+    if crashes and request.node.get_closest_marker("crashes") is None:
+        raise crashes[0]
 
 
 def assert_valid(domain_text: str, problem_text: str, plan: TaskPlan) -> None:

@@ -126,6 +126,7 @@ class LiveLine:
 
 
 _STYLES = {
+    "planner_crashed": "red",
     "refinement_failed": "yellow",
     "learned": "magenta",
     "plan_installed": "cyan",

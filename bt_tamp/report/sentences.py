@@ -15,6 +15,8 @@ def sentence(event: Event) -> str | None:
             return planner_failed(event) or _proof(data["plan"])
         case "refinement_failed":
             return f"{data['action']} can't be done like this: {data['reason']}{in_the_way(event)}"
+        case "planner_crashed":
+            return f"{data['doing']} {data['action']} crashed: {'; '.join(data['crashes'])}"
         case "backtracked":
             return f"another choice for {data['to']}, so that {data['action']} may work"
         case "learned":

@@ -62,6 +62,10 @@ class _Teller:
     def _refinement_failed(self, event: Event, data: Any) -> None:
         self._say(f"{data['action']} could not be worked out: {data['reason']}{in_the_way(event)}.", "  - ")
 
+    def _planner_crashed(self, event: Event, data: Any) -> None:
+        crashes = "; ".join(data["crashes"])
+        self._say(f"The program crashed in {data['doing']} {data['action']}, which cost samples: {crashes}.", "  - ")
+
     def _backtracked(self, event: Event, data: Any) -> None:
         self._say(f"So another choice was made for {data['to']}.", "  - ")
 

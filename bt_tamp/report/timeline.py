@@ -10,6 +10,7 @@ from bt_tamp.report.sentences import sentence
 TOLD = frozenset(
     {
         "disturbed",
+        "planner_crashed",
         "refinement_failed",
         "learned",
         "action_failed",

@@ -40,13 +40,13 @@ def without_its_first_step(found):
     return replace(found, steps=found.steps[1:]) if isinstance(found, TaskPlan) else found
 
 
-def planned(task_planner, skill, scene):
+def planned(task_planner, skill, scene, heard=None):
     loop = SearchThenSample(
         task_planner,
         dict.fromkeys(("pick", "place", "wipe", *(a.name.split("--")[0] for a in DOMAIN.actions)), skill),
         DOMAIN,
         PlanSettings(tries=5),
-        lambda kind, data: None,
+        lambda kind, data: None if heard is None else heard.append((kind, data)),
     )
     return loop.plan(scene, GOAL, np.random.default_rng(0), Work())
 
@@ -97,6 +97,7 @@ def test_a_plan_that_does_not_work_is_not_taken(tabletop, stand_in):
     assert "its plan does not work: step 1, place(cup, right_bin), needs holding(cup)" in outcome.reason
 
 
+@pytest.mark.crashes
 def test_a_refiner_that_crashes_fails_its_action_and_no_more(tabletop, stand_in):
     def broken(action, *_):
         if action.args[-1] == "right_bin":
@@ -104,4 +105,27 @@ def test_a_refiner_that_crashes_fails_its_action_and_no_more(tabletop, stand_in)
 
     outcome = planned(PyperplanPlanner(), stand_in(broken), tabletop("cup"))
     assert isinstance(outcome, NoPlan)
-    assert "working it out failed (ZeroDivisionError: on purpose)" in outcome.reason
+    assert "working it out crashed, ZeroDivisionError in broken (test_faulty_planners.py:" in outcome.reason
+    assert "on purpose" in outcome.reason
+
+
+@pytest.mark.crashes
+@pytest.mark.parametrize("spoilt", [1, 1000])
+def test_foreseeing_that_crashes_fails_the_sample_and_is_told(spoilt, tabletop, stand_in):
+    class ShortSighted(stand_in):
+        def predict(self, scene, refinement):
+            if refinement.action.name == "pick" and refinement.sample < spoilt:
+                raise KeyError("on purpose")
+            return super().predict(scene, refinement)
+
+    heard = []
+    outcome = planned(PyperplanPlanner(), ShortSighted(lambda *_: None), tabletop("cup"), heard)
+    told = [data for kind, data in heard if kind == "planner_crashed"]
+    assert told[0]["action"] == "pick(cup, table)"
+    assert "KeyError in predict (test_faulty_planners.py:" in told[0]["crashes"][0]
+    if spoilt == 1:
+        assert isinstance(outcome, Solution)
+        assert outcome.refinements[0].sample == 1
+    else:
+        assert isinstance(outcome, NoPlan)
+        assert "foreseeing its outcome crashed, KeyError" in outcome.reason
