@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, replace
-from threading import Thread
+from threading import TIMEOUT_MAX, Thread
 
 from joblib.externals.loky import ProcessPoolExecutor
 from joblib.externals.loky.process_executor import BrokenProcessPool
@@ -17,6 +17,12 @@ from bt_tamp.options import RunOptions
 
 MAX_TRIES = 2
 """How often a run is tried, at most, whose process vanishes."""
+
+TO_BEGIN = 600.0
+"""Seconds that a run gets on top, for imports and for what is compiled once."""
+
+SLOWEST = 5.0
+"""Times its longest simulated time that a run may take: one that takes longer hangs. It ends itself otherwise."""
 
 PARENT_EVERY = 0.5
 """Seconds between two looks of a worker at whether its parent still is."""
@@ -38,8 +44,8 @@ class Job:
 @dataclass(frozen=True)
 class Finished:
     """What became of a job, at its how-manieth try. outcome: that of the run, or "crashed" (an error in our code),
-    "killed" (its process vanished), "wrong_input". result: `result.json` as text, None unless the run came
-    to its end."""
+    "killed" (its process vanished, or hung and was ended), "wrong_input". result: `result.json` as text, None unless
+    the run came to its end."""
 
     job: Job
     outcome: str
@@ -48,13 +54,32 @@ class Finished:
     tries: int = 1
 
 
+@dataclass(frozen=True)
+class _Running:
+    """A job at work, and when (s, `time.monotonic`) its process will be taken to hang."""
+
+    job: Job
+    executor: ProcessPoolExecutor
+    until: float
+
+
+def patience(job: Job) -> float:
+    """Seconds of real time after which a job's process is taken to hang."""
+    return TO_BEGIN + SLOWEST * job.options.max_sim_time
+
+
 def run_jobs(
-    jobs: Iterable[Job], processes: int, work: Callable[[Job], Finished] | None = None
+    jobs: Iterable[Job],
+    processes: int,
+    work: Callable[[Job], Finished] | None = None,
+    allowed: Callable[[Job], float] = patience,
 ) -> Generator[Finished, None, None]:
-    """Run the jobs, so many at a time, and yield each as it comes to its end. work: what runs a job (`run_job`).
+    """Run the jobs, so many at a time, and yield each as it comes to its end. work: what runs a job (`run_job`);
+    allowed: the seconds of real time that a job gets before its process is ended.
 
     Every process is an executor of its own, so that one that dies can be told from its neighbours. A job whose process
-    vanishes is tried MAX_TRIES times in all: one that kills it each time is recorded as such.
+    vanishes is tried MAX_TRIES times in all: one that kills it each time is recorded as such. One that hangs is not
+    tried again at once: it would cost as much time once more.
     Leaving the iterator early ends the processes.
     """
     work = run_job if work is None else work
@@ -62,28 +87,32 @@ def run_jobs(
     idle = [_executor() for _ in range(processes)]
     again: list[Job] = []
     tries: Counter[Job] = Counter()
-    running: dict[Future, tuple[Job, ProcessPoolExecutor]] = {}
+    running: dict[Future, _Running] = {}
     try:
         while True:
             while idle and (job := again.pop() if again else next(waiting, None)) is not None:
                 executor = idle.pop()
                 tries[job] += 1
-                running[executor.submit(work, job)] = (job, executor)
+                running[executor.submit(work, job)] = _Running(job, executor, time.monotonic() + allowed(job))
             if not running:
                 return
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                job, executor = running.pop(future)
-                finished = _harvest(job, future)
+            left = max(0.0, min(one.until for one in running.values()) - time.monotonic())
+            done = wait(running, min(left, TIMEOUT_MAX), return_when=FIRST_COMPLETED).done
+            hanging = {future for future, one in running.items() if one.until <= time.monotonic()} - done
+            for future in [*done, *hanging]:
+                job, executor = running[future].job, running[future].executor
+                del running[future]
+                finished = _hung(job, allowed(job)) if future in hanging else _harvest(job, future)
                 if finished.outcome == "killed":
                     executor.shutdown(wait=False, kill_workers=True)
                     executor = _executor()
                 idle.append(executor)
-                if finished.outcome == "killed" and tries[job] < MAX_TRIES:
+                if finished.outcome == "killed" and future not in hanging and tries[job] < MAX_TRIES:
                     again.append(job)
                     continue
                 yield replace(finished, tries=tries[job])
     finally:
-        for executor in [*idle, *(executor for _, executor in running.values())]:
+        for executor in [*idle, *(one.executor for one in running.values())]:
             executor.shutdown(wait=False, kill_workers=True)
 
 
@@ -127,6 +156,10 @@ def _end_with(parent: int) -> None:
         os._exit(1)
 
     Thread(target=look, daemon=True).start()
+
+
+def _hung(job: Job, seconds: float) -> Finished:
+    return Finished(job, "killed", f"it had not come to its end after {seconds:.0f} s of real time, and was ended")
 
 
 def _harvest(job: Job, future: Future) -> Finished:

@@ -1,3 +1,4 @@
+import ctypes
 import json
 import os
 import signal
@@ -15,7 +16,7 @@ from bt_tamp.commands.sweep import seeds
 from bt_tamp.errors import UserError
 from bt_tamp.options import RunOptions
 from bt_tamp.report.result import RunResult
-from bt_tamp.sweep import Finished, Job, run_jobs
+from bt_tamp.sweep import Finished, Job, patience, run_jobs
 from bt_tamp.sweep_store import SweepStore
 from bt_tamp.sweep_table import print_table, summaries
 
@@ -45,6 +46,29 @@ def test_a_process_that_vanishes_and_one_that_fails_cost_no_other_run() -> None:
     outcomes = {done.job.options.seed: done.outcome for done in run_jobs(map(job, range(5)), 2, work)}
 
     assert outcomes == {0: "goal_reached", 1: "killed", 2: "crashed", 3: "goal_reached", 4: "goal_reached"}
+
+
+def test_a_run_that_hangs_in_native_code_is_ended_recorded_and_costs_no_other() -> None:
+    def work(given: Job) -> Finished:
+        if given.options.seed == 1:
+            # Unlike CDLL it keeps the interpreter's lock: no thread of the process runs any more.
+            ctypes.PyDLL(None).sleep(600)
+        return Finished(given, "goal_reached", "", str(os.getpid()))
+
+    def allowed(given: Job) -> float:
+        return 3.0 if given.options.seed == 1 else 120.0
+
+    found = {done.job.options.seed: done for done in run_jobs(map(job, range(4)), 1, work, allowed)}
+    assert [found[seed].outcome for seed in range(4)] == ["goal_reached", "killed", "goal_reached", "goal_reached"]
+    assert found[1].reason == "it had not come to its end after 3 s of real time, and was ended"
+    assert found[1].tries == 1
+    wait_for_the_end_of([int(found[0].result or 0)])
+
+
+def test_a_run_gets_more_real_time_the_longer_it_may_simulate() -> None:
+    short, long = (patience(Job("fig2", RunOptions(max_sim_time=seconds))) for seconds in (10.0, 1000.0))
+    assert 60.0 < short < long
+    assert long > 3 * 1000.0
 
 
 def test_the_libraries_of_a_run_keep_to_one_thread() -> None:
