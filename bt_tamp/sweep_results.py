@@ -1,6 +1,7 @@
 """What sweeps found, by scene and class of disturbance: success and how sure that is, time lost, why runs failed."""
 
 import math
+import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,13 +23,14 @@ WITHOUT_A_PLAN = ("refined_again", "rebuilt")
 """Answers that take no new task plan."""
 
 RIGHT_VERDICTS = ("proven_infeasible", "no_plan")
-"""How a run should end whose goal can't be reached."""
+"""How a run should end whose goal can't be reached, if it also says what put it out of reach."""
 
 
 @dataclass(frozen=True)
 class Run:
     """A stored run: `disturb` its classes ("none" for none), `replan` False for the open-loop baseline, `command` that
-    replays it. `succeeded`: the goal was reached, or the right verdict given where it can't be."""
+    replays it. `succeeded`: the goal was reached, or the right verdict given where it can't be: one that names the
+    body that was taken or thrown away."""
 
     scene: str
     seed: int
@@ -56,7 +58,18 @@ class Run:
     def succeeded(self) -> bool:
         if self.is_reachable or not self.is_met:
             return self.outcome == "goal_reached"
-        return self.outcome in RIGHT_VERDICTS
+        return self.outcome in RIGHT_VERDICTS and any(map(self._names, self._lost))
+
+    @property
+    def _lost(self) -> list[str]:
+        """The bodies without which the goal can't be reached any more."""
+        befell = self.result.disturbances if self.result is not None else ()
+        hopeless = [one for one in befell if one.name in CLASSES and not can_be_reached([one.name])]
+        return [name for one in hopeless for name in one.bodies]
+
+    def _names(self, body: str) -> bool:
+        """Does the reason speak of a body, not only of another whose name holds its name?"""
+        return re.search(rf"(?<![\w-]){re.escape(body)}(?![\w-])", self.reason) is not None
 
 
 @dataclass(frozen=True)

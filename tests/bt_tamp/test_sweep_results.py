@@ -42,7 +42,7 @@ def store(tmp_path: Path) -> Path:
         opened.add(finished(1, 27.0, ("moved",)))
         opened.add(finished(2, 9.0, ("moved",), "gave_up", "25 plans were made"))
         opened.add(finished(0, 8.0, ("moved",), "gave_up", "open loop: it failed", replan=False))
-        opened.add(finished(0, 30.0, ("taken-for-good",), "no_plan", "cube is nowhere to be seen"))
+        opened.add(finished(0, 30.0, ("taken-for-good",), "no_plan", "book is nowhere to be seen"))
         opened.add(finished(1, 30.0, ("taken-for-good",), "goal_reached"))
     return path
 
@@ -64,6 +64,23 @@ def test_time_is_lost_against_the_undisturbed_run_of_the_same_seed(store):
 
 def test_where_the_goal_cannot_be_reached_the_right_verdict_is_the_success(store):
     assert table(store)["taken-for-good", True].succeeded == 1
+
+
+@pytest.mark.parametrize(
+    "reason",
+    [
+        "the task planner failed (MemoryError: out of memory)",
+        "no plan within 20 rounds: pick(cup, table) doesn't work as cup lies",
+        "bookend is nowhere to be seen",
+        "book-end is nowhere to be seen",
+        "",
+    ],
+)
+def test_a_verdict_that_does_not_name_what_was_taken_is_wrong(reason, tmp_path):
+    with SweepStore(tmp_path / "s.db") as opened:
+        opened.add(finished(0, 30.0, ("taken-for-good",), "no_plan", reason))
+        opened.add(finished(1, 30.0, ("taken-for-good",), "proven_infeasible", "pick(book, table) is impossible"))
+    assert table(tmp_path / "s.db")["taken-for-good", True].succeeded == 1
 
 
 def test_a_run_that_nothing_befell_that_matters_is_neither_success_nor_failure(store):
