@@ -129,11 +129,12 @@ def run_scenario(
     audits = Audits.of(machine)
     report("run_started", scene=scenario.name, seed=scenario.seed)
     try:
-        if start is not None:
-            take_up(machine, start)
-        ending = _run(machine, options, recorder, audits, tally)
-    except KeyboardInterrupt:
-        ending = Ending("interrupted", _brake(machine, recorder, audits, tally))
+        try:
+            if start is not None:
+                take_up(machine, start)
+            ending = _run(machine, options, recorder, audits, tally)
+        except KeyboardInterrupt:
+            ending = Ending("interrupted", _brake(machine, recorder, audits, tally))
     except Exception as error:  # Whatever it is: the run's folder is worth most when something went wrong.
         ending = Ending("crashed", f"{type(error).__name__}: {one_line_of(error)}")
         recorder.crash(traceback.format_exc())

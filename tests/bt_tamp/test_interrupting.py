@@ -1,0 +1,56 @@
+"""A run that is interrupted, and what goes wrong then."""
+
+import json
+
+import pytest
+
+from bt_tamp.executive import loop
+from bt_tamp.executive.seams import Seams
+from bt_tamp.options import RunOptions
+from bt_tamp.report.folder import RunFolder
+from bt_tamp.report.recorder import RunRecorder
+from scenarios.load import load_scenario
+from sim.disturbance import DisturbedPlant
+
+
+def interrupted(plant, monkeypatch, folder):
+    """fig2, its plant wrapped in one that interrupts the run."""
+    monkeypatch.setattr(loop, "REAL", Seams(plant=plant))
+    scenario = load_scenario("fig2")
+    with RunRecorder(scenario, RunFolder(folder)) as recorder:
+        return loop.run_scenario(scenario, RunOptions(max_sim_time=5.0), recorder)
+
+
+def calling_at(t, callback):
+    """A plant before each of whose steps, from t seconds on, something is called with the step's number from there."""
+
+    def wrapped(plant):
+        disturbed, count = DisturbedPlant(plant), iter(range(10**6))
+        disturbed.before_step = lambda now: callback(next(count)) if now >= t else None
+        return disturbed
+
+    return wrapped
+
+
+def test_an_error_while_the_arm_is_brought_to_rest_leaves_a_whole_folder(monkeypatch, tmp_path):
+    def break_down(number):
+        raise KeyboardInterrupt if number == 0 else RuntimeError("broken while braking")
+
+    result = interrupted(calling_at(0.3, break_down), monkeypatch, tmp_path / "run")
+    assert result.outcome == "crashed"
+    assert "broken while braking" in result.reason
+    assert "KeyboardInterrupt" in (tmp_path / "run" / "crash.txt").read_text()
+    assert json.loads((tmp_path / "run" / "result.json").read_text())["outcome"] == "crashed"
+    assert (tmp_path / "run" / "state.json").exists()
+    assert (tmp_path / "run" / "signals.npz").exists()
+
+
+@pytest.mark.parametrize(("times", "said"), [(1, "the arm brought to rest"), (2, "twice, and ended at once")])
+def test_an_interruption_ends_the_run_softly_and_a_second_one_at_once(times, said, monkeypatch, tmp_path):
+    def interrupt(number):
+        if number < times:
+            raise KeyboardInterrupt
+
+    result = interrupted(calling_at(0.3, interrupt), monkeypatch, tmp_path / "run")
+    assert result.outcome == "interrupted"
+    assert said in result.reason
