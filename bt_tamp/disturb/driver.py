@@ -31,7 +31,7 @@ LOOK_EVERY = 0.02
 """Seconds between two looks for the consequences of what was done."""
 
 PATIENCE = 600
-"""How often at most."""
+"""How often at most, unless it must come: what was taken for a while comes back, or the goal would be out of reach."""
 
 STILL_PHASE = 0.3
 """Seconds taken for the length of a phase in which only the fingers move."""
@@ -39,7 +39,8 @@ STILL_PHASE = 0.3
 
 @dataclass
 class _Coming:
-    """One instance: what draws it, by which chance, and when: `due` (s), once that is known."""
+    """One instance: what draws it, by which chance, and when: `due` (s), once that is known. is_owed: it follows from
+    what was done before, and is tried as long as the run lasts."""
 
     name: str
     draw: Draw
@@ -51,6 +52,7 @@ class _Coming:
     spot: tuple[str, str] | None = None
     met: int = 0
     tries: int = 0
+    is_owed: bool = False
 
 
 @dataclass
@@ -196,7 +198,7 @@ class Driver:
         if deed is None:
             coming.tries += 1
             coming.due = t + AGAIN
-            if coming.tries > PATIENCE:
+            if coming.tries > PATIENCE and not coming.is_owed:
                 self._coming.remove(coming)
             return
         self._coming.remove(coming)
@@ -214,7 +216,7 @@ class Driver:
         if deed.goal is not None:
             now.machine.agenda.want(deed.goal)
         if deed.later is not None:
-            self._coming.append(_Coming(coming.name, deed.later.draw, coming.rng, due=deed.later.t))
+            self._coming.append(_Coming(coming.name, deed.later.draw, coming.rng, due=deed.later.t, is_owed=True))
 
     def _tell(self, name: str, deed: Deed) -> None:
         machine = self._machine

@@ -48,6 +48,13 @@ of what lies before it."""
 AWAY = (2.0, 5.0)
 """Seconds for which something is gone."""
 
+BACK = 0.10
+"""Metres within which it comes back, if there is room."""
+
+WAITS = 1.0
+SPREADS = 0.2
+"""Seconds for which room is sought so near, and m/s by which it is sought further off from then on."""
+
 
 def moved(now: Occasion) -> Deed | None:
     """An object of this or a later action is put elsewhere on the table."""
@@ -106,15 +113,17 @@ def taken_and_returned(now: Occasion) -> Deed | None:
     names = _shuffled(now, _on_table(now))
     if not names:
         return None
-    name = names[0]
-    back = partial(brought_back, name=name, X_WO=now.truth.poses[name])
-    later = Later(now.t + now.rng.uniform(*AWAY), back)
+    name, t_back = names[0], now.t + now.rng.uniform(*AWAY)
+    later = Later(t_back, partial(brought_back, name=name, X_WO=now.truth.poses[name], since=t_back))
     return Deed(f"{name} was taken away", (TakenAway(start=now.t, name=name),), later=later, names=(name,))
 
 
-def brought_back(now: Occasion, name: str, X_WO: SE3) -> Deed | None:
-    """What was taken comes back, near X_WO."""
-    spot = now.spot(now.scenario.bodies[name], X_WO.rotation, X_WO.translation[:2], (0.0, 0.10))
+def brought_back(now: Occasion, name: str, X_WO: SE3, since: float) -> Deed | None:
+    """What was taken comes back, near X_WO; the longer after `since` (s) there is no room, the further off, in the end
+    anywhere on the table."""
+    across = float(np.linalg.norm(now.scenario.table.size[:2]))
+    within = min(BACK + SPREADS * max(0.0, now.t - since - WAITS), across)
+    spot = now.spot(now.scenario.bodies[name], X_WO.rotation, X_WO.translation[:2], (0.0, within))
     if spot is None:
         return None
     return Deed(f"{name} was brought back", (Brought(start=now.t, name=name, X_WO=spot),), names=(name,))

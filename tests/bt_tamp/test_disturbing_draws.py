@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bt_tamp.disturb.classes import KINDS, Prospect
-from bt_tamp.disturb.deed import Occasion
-from bt_tamp.disturb.world import crumbs_beside_pan, knocked_from_hand, moved, rotated
+from bt_tamp.disturb import driver
+from bt_tamp.disturb.classes import KINDS, Kind, Prospect
+from bt_tamp.disturb.deed import Deed, Later, Occasion
+from bt_tamp.disturb.driver import Driver
+from bt_tamp.disturb.world import brought_back, crumbs_beside_pan, knocked_from_hand, moved, rotated
 from bt_tamp.executive.build import build
 from bt_tamp.options import RunOptions
 from planner.motion.motion_planner import MotionPlanner
@@ -18,6 +20,8 @@ from scenarios.document import parse_document
 from scenarios.generate import generate
 from scenarios.library import scenario_path
 from scenarios.load import build_scenario, load_scenario
+from scenarios.scenario import Fixture
+from scenarios.shapes import Box
 from sim.scene import Held
 from skills.gathering import Place, strokes_for
 from skills.strokes import Crumbs, Tool, opening_of
@@ -101,3 +105,45 @@ def test_what_is_round_is_not_turned_on_the_spot(shape, is_turned):
     now = Occasion(0.0, machine.plant.observe(), machine, MotionPlanner(machine.robot), np.random.default_rng(0))
     assert (rotated(now) is not None) == is_turned
     machine.plant.close()
+
+
+def test_what_was_taken_comes_back_further_off_where_there_is_no_room_nearby():
+    scenario = load_scenario("fig1")
+    X_WO = scenario.bodies["carrot"].X_WO
+    slab = Fixture("slab", Box((0.28, 0.28, 0.05)), X_WO, 0.5, (1.0, 1.0, 1.0, 1.0))
+    machine = build(replace(scenario, fixtures={"slab": slab}), RunOptions(), lambda kind, **data: None, print)
+    machine.plant.take_away("carrot")
+    rng, motion = np.random.default_rng(0), MotionPlanner(machine.robot)
+    deeds = {}
+    for waited in (0.0, 0.5, 1.0, 6.0):
+        now = Occasion(10.0 + waited, machine.plant.observe(), machine, motion, rng)
+        deeds[waited] = brought_back(now, name="carrot", X_WO=X_WO, since=10.0)
+    machine.plant.close()
+    assert not deeds[0.0]
+    assert not deeds[0.5]
+    assert not deeds[1.0]
+    deed = deeds[6.0]
+    assert deed is not None
+    spot = deed.faults[0].X_WO
+    assert np.linalg.norm((spot.translation - X_WO.translation)[:2]) > 0.14
+    assert now.is_on_table(spot.translation[:2], 0.0)
+
+
+def test_what_is_owed_comes_however_often_there_was_nothing_to_do(monkeypatch):
+    tries = []
+
+    def back(now):
+        tries.append(now.t)
+        return None if len(tries) < 6 else Deed("it came back")
+
+    monkeypatch.setattr(driver, "PATIENCE", 2)
+    monkeypatch.setitem(KINDS, "moved", Kind(lambda now: Deed("it went", later=Later(now.t + 0.01, back))))
+    told = []
+    # A seed for which it befalls the first planning, at a time that is drawn before.
+    befalling = Driver((), ("moved",), 5, lambda kind, **data: told.append(data["sentence"]))
+    machine = build(load_scenario("fig2"), RunOptions(), lambda kind, **data: None, print, befalling.seams)
+    befalling.bind(machine)
+    while machine.plant.observe().t < 1.5:
+        machine.plant.step()
+    machine.plant.close()
+    assert told == ["it went", "it came back"]
