@@ -1,8 +1,8 @@
 """Run scenes over many seeds in parallel: each result is stored as it arrives, a table closes.
 
 The exit code is 0 when every run has come to its end, whatever its outcome: the table tells that. A run that takes
-more real time than 600 s and five times --max-sim-time hangs: it is ended and recorded as
-killed, and the sweep goes on.
+more real time than 600 s and five times --max-sim-time hangs: it is ended and
+recorded as killed, and the sweep goes on.
 """
 
 import argparse
