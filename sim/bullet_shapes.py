@@ -6,7 +6,7 @@ their bounding box. So these are built in their principal frame I (about O, the 
 
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -82,16 +82,17 @@ def _parts(shape: Compound) -> list[_Piece]:
 def _octants(hull: Hull) -> list[_Piece]:
     """The hull cut along its three axes: PyBullet finds one point of contact at a time for a pair of convex solids, and
     a hull in one piece would turn about it, in the hand as on the table."""
-    pieces = [hull.solid.vertices]
+    pieces = [hull.solid]
     for axis in np.eye(3):
-        pieces = [half for points in pieces for half in _cut(points, axis)]
-    found: list[_Piece] = []
-    for points in pieces:
-        try:
-            found.append((polyhedron(points), SE3.Identity()))
-        except ShapeError:  # a sliver
-            continue
-    return found
+        pieces = [half for piece in pieces for half in _halves(piece, axis)]
+    return [(piece, SE3.Identity()) for piece in pieces]
+
+
+def _halves(solid: Polyhedron, axis: np.ndarray) -> Iterator[Polyhedron]:
+    """Both halves of a convex solid, or the one that isn't a sliver."""
+    for points in _cut(solid.vertices, axis):
+        with suppress(ShapeError):
+            yield polyhedron(points)
 
 
 def _cut(points: np.ndarray, axis: np.ndarray) -> Iterator[np.ndarray]:

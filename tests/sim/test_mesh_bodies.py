@@ -25,6 +25,12 @@ def _hull() -> Hull:
     return Hull.of(ROOF)[0]
 
 
+def _rounded(sides: int) -> Hull:
+    """A prism with so many sides, nearly a can."""
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    return Hull.of(np.array([[0.03 * np.cos(a), 0.03 * np.sin(a), z] for a in angles for z in (0.0, 0.1)]))[0]
+
+
 def _tee() -> Compound:
     """A box, a cylinder and a hull, whose principal axes are not its own."""
     stem = (Cylinder(0.02, 0.08), SE3(np.eye(3), np.array([0.0, 0.0, 0.04])))
@@ -49,7 +55,7 @@ def with_body() -> Callable[..., Scenario]:
     return scenario
 
 
-@pytest.mark.parametrize("shape", [_hull(), _tee()])
+@pytest.mark.parametrize("shape", [_hull(), _tee(), _rounded(16), _rounded(128)])
 def test_it_rests_on_the_table_where_it_was_put(robot, with_body, shape):
     scenario = with_body(shape, drop=0.0005)
     plant = BulletPlant(scenario, robot)
