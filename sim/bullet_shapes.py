@@ -1,7 +1,8 @@
 """Shapes in PyBullet, and the frame about which it turns them.
 
 PyBullet keeps a body's pose as that of its principal axes of inertia, and gives meshes and compounds the inertia of
-their bounding box. So these are built in their principal frame I (about O, the shape's own origin), with the true one.
+their bounding box. So these, and discs, are built in their principal frame I (about O, the shape's own origin), with the
+true one.
 """
 
 import tempfile
@@ -19,10 +20,13 @@ from scenarios.hulls import Polyhedron, ShapeError, polyhedron
 from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, convex_parts, inertia
 from sim.surfaces import triangles
 
+RIM = 48
+"""Sides of what stands for a disc: 0.2 % of its radius is missing between its corners."""
+
 
 def principal_axes(shape: Shape) -> tuple[SE3, np.ndarray] | None:
     """X_OI and the principal moments (3,) per kg; None for a shape that PyBullet knows how to turn by itself."""
-    if not isinstance(shape, Hull | Compound):
+    if not isinstance(shape, Hull | Compound) and not _is_flat(shape):
         return None
     moments, axes = np.linalg.eigh(inertia(shape, 1.0))
     if np.linalg.det(axes) < 0.0:
@@ -35,12 +39,12 @@ def add_collision_shape(shape: Shape, client: int) -> int:
     match shape:
         case Box(size):
             return p.createCollisionShape(p.GEOM_BOX, halfExtents=[s / 2 for s in size], physicsClientId=client)
-        case Cylinder(radius, height):
+        case Cylinder(radius, height) if not _is_flat(shape):
             return p.createCollisionShape(p.GEOM_CYLINDER, radius=radius, height=height, physicsClientId=client)
         case Sphere(radius):
             return p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=client)
-        case Hull() | Compound():
-            with _part_arrays(_octants(shape) if isinstance(shape, Hull) else _parts(shape), _R_OI(shape).T) as arrays:
+        case Cylinder() | Hull() | Compound():
+            with _part_arrays(_pieces(shape), _R_OI(shape).T) as arrays:
                 return p.createCollisionShapeArray(**arrays, physicsClientId=client)
 
 
@@ -75,14 +79,31 @@ def _R_OI(shape: Shape) -> np.ndarray:
 _Piece = tuple[Box | Cylinder | Sphere | Polyhedron, SE3]
 
 
+def _is_flat(shape: Shape) -> bool:
+    """Is it a disc, which lies or is pulled on its face? The engine's one point of contact wanders about under it."""
+    return isinstance(shape, Cylinder) and shape.height < shape.radius
+
+
+def _pieces(shape: Cylinder | Hull | Compound) -> list[_Piece]:
+    match shape:
+        case Cylinder(radius, height):
+            angles = 2.0 * np.pi * np.arange(RIM) / RIM
+            rim = [[radius * np.cos(a), radius * np.sin(a), z] for a in angles for z in (-height / 2, height / 2)]
+            return _octants(polyhedron(np.array(rim)))
+        case Hull():
+            return _octants(shape.solid)
+        case Compound():
+            return _parts(shape)
+
+
 def _parts(shape: Compound) -> list[_Piece]:
     return [(part.solid if isinstance(part, Hull) else part, X_OP) for part, X_OP in convex_parts(shape)]
 
 
-def _octants(hull: Hull) -> list[_Piece]:
-    """The hull cut along its three axes: PyBullet finds one point of contact at a time for a pair of convex solids, and
+def _octants(solid: Polyhedron) -> list[_Piece]:
+    """A hull cut along its three axes: PyBullet finds one point of contact at a time for a pair of convex solids, and
     a hull in one piece would turn about it, in the hand as on the table."""
-    pieces = [hull.solid]
+    pieces = [solid]
     for axis in np.eye(3):
         pieces = [half for piece in pieces for half in _halves(piece, axis)]
     return [(piece, SE3.Identity()) for piece in pieces]

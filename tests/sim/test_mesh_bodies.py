@@ -1,4 +1,4 @@
-"""Meshes and compounds in the simulated world: they rest where they should, turn as they should and can be seen."""
+"""Meshes, compounds and discs in the simulated world: they rest where they should, turn as they should and can be seen."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,6 +19,7 @@ from sim.robot import RobotModel
 
 ROOF = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.06, 0], [0.1, 0.06, 0], [0.02, 0.03, 0.05], [0.08, 0.03, 0.05]])
 TOP = 0.05
+DISC = Cylinder(0.08, 0.015)
 
 
 def _hull() -> Hull:
@@ -55,7 +56,7 @@ def with_body() -> Callable[..., Scenario]:
     return scenario
 
 
-@pytest.mark.parametrize("shape", [_hull(), _tee(), _rounded(16), _rounded(128)])
+@pytest.mark.parametrize("shape", [_hull(), _tee(), DISC, _rounded(16), _rounded(128)])
 def test_it_rests_on_the_table_where_it_was_put(robot, with_body, shape):
     scenario = with_body(shape, drop=0.0005)
     plant = BulletPlant(scenario, robot)
@@ -71,7 +72,7 @@ def test_it_rests_on_the_table_where_it_was_put(robot, with_body, shape):
     assert np.linalg.norm(pin.log3(start.rotation.T @ end.rotation)) < 0.01
 
 
-@pytest.mark.parametrize("shape", [_hull(), _tee()])
+@pytest.mark.parametrize("shape", [_hull(), _tee(), DISC])
 def test_it_is_put_elsewhere_by_its_own_frame(robot, with_body, shape):
     plant = BulletPlant(with_body(shape), robot)
     try:
@@ -82,7 +83,7 @@ def test_it_is_put_elsewhere_by_its_own_frame(robot, with_body, shape):
         plant.close()
 
 
-@pytest.mark.parametrize("shape", [_hull(), _tee()])
+@pytest.mark.parametrize("shape", [_hull(), _tee(), DISC])
 def test_its_principal_moments_are_those_of_its_inertia(shape):
     axes = principal_axes(shape)
     assert axes is not None
@@ -104,7 +105,7 @@ def test_it_is_seen_where_it_is(with_body):
     assert abs(rows.mean() - y) < 15
 
 
-@pytest.mark.parametrize("shape", [_hull(), _tee()])
+@pytest.mark.parametrize("shape", [_hull(), _tee(), DISC])
 def test_the_engine_has_its_mass_and_its_moments_about_its_centre(robot, with_body, shape):
     plant = BulletPlant(with_body(shape), robot)
     try:

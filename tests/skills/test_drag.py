@@ -243,8 +243,8 @@ def lying(shape):
     return with_book(scenario, shape=shape, X_WO=X_WO)
 
 
-@pytest.mark.parametrize("shape", [slab(), board()], ids=["mesh", "compound"])
-def test_a_flat_mesh_or_compound_is_dragged_and_picked_as_a_box_is(shape):
+@pytest.mark.parametrize("shape", [slab(), board(), Cylinder(0.08, 0.015)], ids=["mesh", "compound", "disc"])
+def test_a_flat_mesh_compound_or_disc_is_dragged_and_picked_as_a_box_is(shape):
     bench = Bench(lying(shape))
     assert bench.do("drag(book, table)") is Status.SUCCESS
     assert bench.peak_force < 30.0
