@@ -1,7 +1,7 @@
 """Shapes in PyBullet, and the frame about which it turns them.
 
 PyBullet keeps a body's pose as that of its principal axes of inertia, and gives meshes and compounds the inertia of
-their bounding box. So these, and discs, are built in their principal frame I (about O, the shape's own origin), with the
+their bounding box. So these and discs are built in their principal frame I (about O, the shape's own origin), with the
 true one.
 """
 

@@ -1,4 +1,4 @@
-"""Meshes, compounds and discs in the simulated world: they rest where they should, turn as they should and can be seen."""
+"""Meshes, compounds, discs in the simulated world: they rest where they should, turn as they should, can be seen."""
 
 from collections.abc import Callable
 from dataclasses import replace
