@@ -80,8 +80,9 @@ _Piece = tuple[Box | Cylinder | Sphere | Polyhedron, SE3]
 
 
 def _is_flat(shape: Shape) -> bool:
-    """Is it a disc, which lies or is pulled on its face? The engine's one point of contact wanders about under it."""
-    return isinstance(shape, Cylinder) and shape.height < shape.radius
+    """Is it a disc, wider than high? It lies and is pulled on its face, under which the engine's one point of contact
+    would wander about."""
+    return isinstance(shape, Cylinder) and shape.height < 2.0 * shape.radius
 
 
 def _pieces(shape: Cylinder | Hull | Compound) -> list[_Piece]:

@@ -251,6 +251,12 @@ def test_a_flat_mesh_compound_or_disc_is_dragged_and_picked_as_a_box_is(shape):
     assert bench.do("pick(book, table)") is Status.SUCCESS
 
 
+def test_a_drum_that_is_wider_than_high_does_not_chatter_under_the_fingertips():
+    bench = Bench(lying(Cylinder(0.07, 0.08)))
+    assert bench.do("drag(book, table)") is Status.SUCCESS
+    assert bench.peak_force < 30.0
+
+
 def test_only_the_highest_flat_faces_are_pressed_on():
     flat, knobbed = (
         slab(),
