@@ -13,6 +13,7 @@ from bt_tamp.disturb.consequence import Trial
 from bt_tamp.disturb.deed import Deed, Draw, Occasion
 from bt_tamp.disturb.names import CLASSES
 from bt_tamp.disturb.scheduled import drawing
+from bt_tamp.disturb.unmet import why_declared, why_drawn
 from bt_tamp.executive.build import Machine
 from bt_tamp.executive.seams import REAL, Seams
 from planner.motion.motion_planner import MotionPlanner
@@ -39,8 +40,8 @@ STILL_PHASE = 0.3
 
 @dataclass
 class _Coming:
-    """One instance: what draws it, by which chance, and when: `due` (s), once that is known. is_owed: it follows from
-    what was done before, and is tried as long as the run lasts."""
+    """One instance: what draws it, by which chance, and when: `due` (s), once that is known. number: of the scene's
+    entry, if it is one. is_owed: it follows from what was done before, and is tried as long as the run lasts."""
 
     name: str
     draw: Draw
@@ -52,6 +53,7 @@ class _Coming:
     spot: tuple[str, str] | None = None
     met: int = 0
     tries: int = 0
+    number: int = 0
     is_owed: bool = False
 
 
@@ -59,7 +61,7 @@ class _Coming:
 class Driver:
     """Brings disturbances over one run: those of the scene, and one of each class named.
 
-    `hear` must be told of every event of the run, `bind` of the machine once it is wired.
+    `hear` must be told of every event of the run, `bind` of the machine once it is wired, `close` of the run's end.
     """
 
     declared: Iterable[Disturbance]
@@ -74,11 +76,14 @@ class Driver:
     _told: int = field(default=0, init=False)
     _look_again: float = field(default=0.0, init=False)
     _struck: set[str] = field(default_factory=set, init=False)
+    _given_up: list[_Coming] = field(default_factory=list, init=False)
+    _began: dict[str, None] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         for number, one in enumerate(self.declared):
             rng = np.random.default_rng([self.seed, 11, number])
-            self._coming.append(_Coming("declared", drawing(one.happening), rng, moment=one.moment, due=one.moment.at))
+            draw, moment = drawing(one.happening), one.moment
+            self._coming.append(_Coming("declared", draw, rng, moment=moment, due=moment.at, number=number))
         for name in self.classes:
             kind, rng = KINDS[name], self._stream(name)
             if kind.draw is None:
@@ -107,8 +112,21 @@ class Driver:
         if kind == "action_started":
             self._choose_phases()
         if kind == "phase":
+            self._began[phase] = None
             for coming in self._coming:
                 self._meet(coming, t, action, phase)
+
+    def close(self, t: float) -> None:
+        """The run is over, at t (s): tell what did not come."""
+        for coming in [*self._given_up, *self._coming]:
+            is_due = coming.due is not None and coming.due <= t
+            if coming.is_owed:
+                continue
+            if coming.moment is None:
+                sentence = why_drawn(coming.name, coming.tries)
+            else:
+                sentence = why_declared(coming.number, coming.moment, coming.met, is_due, self._began)
+            self.report("never_came", name=coming.name, sentence=sentence)
 
     def _stream(self, name: str) -> np.random.Generator:
         return np.random.default_rng([self.seed, 13, crc32(name.encode())])
@@ -200,6 +218,7 @@ class Driver:
             coming.due = t + AGAIN
             if coming.tries > PATIENCE and not coming.is_owed:
                 self._coming.remove(coming)
+                self._given_up.append(coming)
             return
         self._coming.remove(coming)
         self._carry_out(coming, deed, now)

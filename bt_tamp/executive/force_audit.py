@@ -11,7 +11,7 @@ from sim.robot import RobotModel
 from skills.context import SkillContext
 
 SETTLED = 0.5
-"""Seconds after touchdown from which the force is judged."""
+"""Seconds after touchdown, or after another force is wanted, from which the force is judged."""
 
 
 @dataclass
@@ -32,7 +32,7 @@ class ForceAudit:
 
     @property
     def found(self) -> tuple[PressedMotion, ...]:
-        """Every motion in contact so far, in order of time."""
+        """Every motion in contact so far, in order of time; one that was pressed harder on the way counts as two."""
         self._close()
         return tuple(self._found)
 
@@ -42,9 +42,11 @@ class ForceAudit:
         if phase is None or phase.press is None or phase.kind not in ("touch", "slide"):
             self._close()
             return
-        if self._now is None or self._now.action != action:
+        reference = context.controller.reference
+        wanted = (reference.force if reference else 0.0) or phase.press.force
+        if self._now is None or (self._now.action, self._now.target) != (action, wanted):
             self._close()
-            self._now = _Motion(action, phase.press.force)
+            self._now = _Motion(action, wanted)
         if self._now.touched_at is None and context.controller.contact:
             self._now.touched_at = t
         if self._now.touched_at is None or t < self._now.touched_at + SETTLED:

@@ -140,6 +140,8 @@ def run_scenario(
         recorder.crash(traceback.format_exc())
     result = _result(machine, scenario, ending, audits, tally)
     recorder.tree(machine.mission.root, "end", tally.results)
+    if driver is not None:
+        driver.close(tally.t)
     report("run_ended", outcome=result.outcome, sentence=result.reason)
     recorder.finish(result, state_of(machine))
     machine.plant.close()

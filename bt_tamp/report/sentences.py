@@ -35,6 +35,8 @@ def sentence(event: Event) -> str | None:
             return f"planning again: {data['reason']}"
         case "disturbed":
             return f"disturbance: {data['sentence']}"
+        case "never_came":
+            return data["sentence"]
         case "missing":
             return f"waiting for {', '.join(data['bodies'])} to turn up again"
         case "waiting":

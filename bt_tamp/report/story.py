@@ -30,6 +30,7 @@ class _Teller:
         self._phases: list[str] = []
         self._running: str | None = None
         self._last_failure = ""
+        self._unmet: list[str] = []
 
     def hear(self, event: Event) -> None:
         tell = getattr(self, f"_{event.kind}", None)
@@ -124,6 +125,9 @@ class _Teller:
         meanwhile = ", while planning" if data["phase"] == "planning" else f", during {during}"
         self._say(f"DISTURBANCE{meanwhile}: {data['sentence']}.", f"{event.t:7.1f} s          ")
 
+    def _never_came(self, event: Event, data: Any) -> None:
+        self._unmet.append(data["sentence"])
+
     def _missing(self, event: Event, data: Any) -> None:
         names = ", ".join(data["bodies"])
         self._say(f"The arm waited for {names} to turn up again.", f"{event.t:7.1f} s          ")
@@ -154,6 +158,8 @@ class _Teller:
             f" {counted(result.rounds, 'round')}, {counted(result.replans, 'replan')}). Contact force reached"
             f" {result.peak_contact_force_n:.1f} N; {counted(len(result.unintended_contacts), 'unintended contact')}."
         )
+        for sentence in self._unmet:
+            self._say(sentence[0].upper() + sentence[1:] + ".")
         for motion in result.pressed:
             self._say(
                 f"{motion.action} pressed with {motion.mean_n:.2f} N, {motion.target_n:.4g} N wanted: off by"

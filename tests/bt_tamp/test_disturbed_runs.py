@@ -21,6 +21,9 @@ disturbances:
   - {at: 0.6, shift: {region: left_bin, by: [0.05, 0.10, 0.0]}}
   - {at: 1.2, bring: {object: sponge}}
   - {at: 1.4, goal: "(in_bin sponge left_bin)"}
+  - {phase: pregrasp, action: pick, take: {object: cube}}
+  - {phase: pre-grasp, nth: 40, take: {object: cube}}
+  - {at: 90, take: {object: cube}}
 """
 
 
@@ -75,6 +78,16 @@ def test_the_story_tells_what_was_done(declared, capsys):
     told = capsys.readouterr().out
     assert "DISTURBANCE" in told
     assert "cube was moved" in told
+
+
+def test_the_story_tells_what_was_declared_and_did_not_come(declared, capsys):
+    assert main(["explain", str(declared / "one")]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "Disturbances[6] of the scene did not come: pick's phase 'pregrasp' did not begin; those that did:" in told
+    assert "pre-grasp" in told.partition("those that did: ")[2].partition(".")[0]
+    assert "Disturbances[7] of the scene did not come: phase 'pre-grasp' began " in told
+    assert "Disturbances[8] of the scene did not come: the run was over before 90 s." in told
+    assert "Disturbances[0]" not in told
 
 
 def test_the_film_shows_what_was_there(declared, tmp_path):

@@ -9,6 +9,7 @@ from pinocchio import SE3
 from py_trees.common import Status
 
 from bt_tamp.executive.build import build_planner
+from bt_tamp.executive.force_audit import ForceAudit
 from bt_tamp.options import RunOptions
 from planner.failure import RefinementFailure
 from planner.refinement import Budget, Hints, Refinement, Work
@@ -181,8 +182,19 @@ def test_a_book_that_slips_is_pressed_harder_on_the_way_and_still_comes_to_where
     before, found = bench.scene, []
     refine = bench.context.refine
     bench.context.refine = lambda what: (found.append(refine(what)[0]), (found[-1], 0.0))[1]
+    audit = ForceAudit(bench.robot)
+    run = bench.run
+
+    def watched(ticks):
+        for _ in range(ticks // 5):
+            run(5)
+            audit.look(bench.context.observation.t, bench.plant.contacts(), bench.context, "drag")
+
+    bench.run = watched
     assert bench.do("drag(book, table)") is Status.SUCCESS
     assert told == [16.0]
+    assert audit.found[-1].target_n == 16.0
+    assert all(motion.rms_error_n < 0.2 * motion.target_n for motion in audit.found)
     meant = bench.skills["drag"].predict(before, found[0]).poses["book"].translation
     assert np.linalg.norm(bench.scene.poses["book"].translation - meant) < 0.01
     assert bench.peak_force < 25.0
