@@ -19,6 +19,9 @@ Z95 = 1.959964
 
 UNDISTURBED = "none"
 
+TOGETHER = "all"
+"""Scene of lines that are about the runs of all."""
+
 WITHOUT_A_PLAN = ("refined_again", "rebuilt")
 """Answers that take no new task plan."""
 
@@ -157,11 +160,12 @@ def wilson(succeeded: int, runs: int) -> tuple[float, float]:
     return low, 1.0 if succeeded == runs else min(1.0, centre + half)
 
 
-def lines(runs: Sequence[Run]) -> list[Line]:
-    """One line for each scene, class and way (watching or open loop), undisturbed runs first."""
+def lines(runs: Sequence[Run], together: bool = False) -> list[Line]:
+    """One line for each scene, class and way (watching or open loop), undisturbed runs first. together: all scenes'
+    runs of a class and way in one line."""
     groups: dict[tuple[str, str, bool], list[Run]] = {}
     for run in runs:
-        groups.setdefault((run.scene, run.disturb, run.replan), []).append(run)
+        groups.setdefault((TOGETHER if together else run.scene, run.disturb, run.replan), []).append(run)
     order = {name: number for number, name in enumerate((UNDISTURBED, *CLASSES))}
     keys = sorted(groups, key=lambda key: (key[0], order.get(key[1], len(order)), key[1], not key[2]))
     usual = {(r.scene, r.seed, r.options, r.replan): r for r in runs if r.disturb == UNDISTURBED and r.succeeded}
@@ -236,6 +240,36 @@ def hits(runs: Iterable[Run]) -> Counter[str]:
         if run.result is not None and run.disturb != UNDISTURBED
         for one in run.result.disturbances
     )
+
+
+def totals(runs: Sequence[Run]) -> list[str]:
+    """What all disturbed runs come to, in one sentence for each way."""
+    told = []
+    for replan in (True, False):
+        mine = [run for run in runs if run.replan == replan and run.disturb != UNDISTURBED]
+        if not mine:
+            continue
+        met = [run for run in mine if run.is_met]
+        results = [run.result for run in mine if run.result is not None]
+        broken = sum(result.torque_limit_violations + result.unlawful_commands for result in results)
+        peak = max((max(result.peak_force_n, result.peak_contact_force_n) for result in results), default=0.0)
+        parts = [
+            f"{_share(reachable)} {what}"
+            for is_reachable, what in ((True, "reached a goal that can be"), (False, "told rightly that it can't be"))
+            if (reachable := [run for run in met if run.is_reachable == is_reachable])
+        ]
+        parts.append(f"{sum(run.outcome in UNFINISHED for run in mine)} crashed, {broken} torques broke a limit")
+        parts.append(f"peak {peak:.1f} N")
+        way = "watching" if replan else "open loop"
+        told.append(f"{way}: {len(met)} of {len(mine)} disturbed runs were met; {'; '.join(parts)}")
+    return told
+
+
+def _share(runs: Sequence[Run]) -> str:
+    succeeded = sum(run.succeeded for run in runs)
+    low, high = wilson(succeeded, len(runs))
+    rate = f"{100 * succeeded / len(runs):.1f} %, {100 * low:.0f}–{100 * high:.0f}"
+    return f"{succeeded} of {len(runs)} ({rate})"
 
 
 def _why(run: Run) -> str:

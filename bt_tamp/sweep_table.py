@@ -14,6 +14,15 @@ from bt_tamp.report.result import RunResult
 from bt_tamp.sweep import Job
 from bt_tamp.sweep_store import Row
 
+WIDTH = 130
+"""Columns of a table that is written to a file or a pipe."""
+
+
+def table_console() -> Console:
+    """Where tables are printed: as wide as the window, but lines of a file need not fit one."""
+    console = Console()
+    return console if console.is_terminal else Console(width=WIDTH)
+
 
 @dataclass(frozen=True)
 class Summary:

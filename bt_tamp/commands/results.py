@@ -5,7 +5,7 @@ Runs that ended before anything that matters befell them are no success: they ar
 lost s: robot time beyond the undisturbed run of the same scene and seed, median; × action: as a multiple of the action
 that was undone. react s: from a disturbance of the running action until the arm stood still or set out anew, thinking
 included, where that took no new task plan: median / 95 %. peak N: the largest true force. broken: torques beyond their
-limit, or NaN.
+limit, or NaN. --together makes one line of all scenes' runs of a class.
 """
 
 import argparse
@@ -18,12 +18,10 @@ if TYPE_CHECKING:
     from bt_tamp.sweep_results import Line, Run
 
 
-WIDTH = 130
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Store and folder."""
     parser.add_argument("store", type=Path, metavar="FILE", help="a store that `bt-tamp sweep` wrote")
+    parser.add_argument("--together", action="store_true", help="a line for each class, of the runs of all scenes")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for plots (PNG) and CSV files")
 
 
@@ -39,7 +37,7 @@ def call(arguments: argparse.Namespace) -> int:
         runs = runs_of(store.everything())
     if not runs:
         raise UserError(f"{arguments.store}: holds no runs")
-    found = lines(runs)
+    found = lines(runs, arguments.together)
     _print(found, runs)
     if arguments.out is not None:
         _export(arguments.out, found, runs)
@@ -48,16 +46,14 @@ def call(arguments: argparse.Namespace) -> int:
 
 def _print(found: "list[Line]", runs: "list[Run]") -> None:
     from rich.box import SIMPLE_HEAD
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     from bt_tamp.report.sentences import counted
-    from bt_tamp.sweep_results import at_95, hits, reactions_of, scene_name
+    from bt_tamp.sweep_results import at_95, hits, reactions_of, scene_name, totals
+    from bt_tamp.sweep_table import table_console
 
-    console = Console()
-    if not console.is_terminal:  # Lines of a file need not fit a window.
-        console = Console(width=WIDTH)
+    console = table_console()
     table = Table(pad_edge=False, box=SIMPLE_HEAD)
     table.add_column("scene", no_wrap=True)
     table.add_column("class", no_wrap=True)
@@ -69,7 +65,7 @@ def _print(found: "list[Line]", runs: "list[Run]") -> None:
             scene_name(line.scene),
             line.disturb + ("" if line.replan else ", open loop"),
             f"{line.succeeded}/{line.runs}",
-            f"{100 * low:.0f}–{100 * high:.0f}",
+            f"{100 * low:.0f}–{100 * high:.0f}" if line.runs else "–",
             *(_shown(value) for value in (line.replans, line.lost_s, line.lost_actions)),
             "–" if line.reacted_s is None else f"{line.reacted_s:.2f} / {line.slow_reacted_s:.2f}",
             _shown(line.peak_n),
@@ -84,6 +80,8 @@ def _print(found: "list[Line]", runs: "list[Run]") -> None:
     struck = hits(runs)
     if struck:
         console.print(Text("phases hit: " + ", ".join(f"{what} {n}" for what, n in struck.most_common())))
+    for told in totals(runs):
+        console.print(told, highlight=False)
     for run in (run for run in runs if run.is_met and not run.succeeded):
         said = f"{run.outcome.replace('_', ' ')}{': ' if run.reason else ''}{run.reason}"
         console.print(Text(f"{run.command}\n    {said}"), soft_wrap=True)

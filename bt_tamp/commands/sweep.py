@@ -58,11 +58,9 @@ def call(arguments: argparse.Namespace) -> int:
     """Run what isn't stored yet, then print the table."""
     jobs = _jobs(arguments)
 
-    from rich.console import Console
-
     from bt_tamp.errors import UserError
     from bt_tamp.sweep_store import SweepStore
-    from bt_tamp.sweep_table import print_table
+    from bt_tamp.sweep_table import print_table, table_console
 
     with SweepStore(arguments.store) as store:
         stored = store.stored(jobs)
@@ -76,7 +74,7 @@ def call(arguments: argparse.Namespace) -> int:
             print(f"bt-tamp: interrupted; what is done lies in {arguments.store}, --resume goes on", file=sys.stderr)
             return 130
         finally:
-            print_table(Console(), store.stored(jobs))
+            print_table(table_console(), store.stored(jobs))
     return 0
 
 

@@ -141,6 +141,22 @@ def test_the_command_names_every_choice_and_means_the_same_run():
     assert options_of(arguments) == options
 
 
+def test_runs_of_all_scenes_come_together_in_one_line_a_class_and_in_one_sentence_at_the_end(store, capsys):
+    with SweepStore(store) as opened:
+        elsewhere = finished(7, 25.0, ("moved",))
+        opened.add(replace(elsewhere, job=replace(elsewhere.job, scene="some/where/fig3.yaml")))
+    assert main(["results", str(store)]) == 0
+    assert {"fig2", "fig3"} <= set(capsys.readouterr().out.split())
+    assert main(["results", str(store), "--together"]) == 0
+    said = capsys.readouterr().out
+    moved = next(line.split() for line in said.splitlines() if "moved" in line and "open loop" not in line)
+    assert moved[:3] == ["all", "moved", "3/4"]
+    joined = " ".join(said.split())
+    assert "watching: 6 of 6 disturbed runs were met; 3 of 4 (75.0 %, 30–95) reached a goal that can be; " in joined
+    assert "1 of 2 (50.0 %, 9–91) told rightly that it can't be; 0 crashed, 0 torques broke a limit;" in joined
+    assert "open loop: 1 of 1 disturbed runs were met; 0 of 1 (0.0 %, 0–79) reached a goal that can be;" in joined
+
+
 def test_the_table_is_printed_and_written(store, tmp_path, capsys):
     assert main(["results", str(store), "--out", str(tmp_path / "out")]) == 0
     said = " ".join(capsys.readouterr().out.split())
