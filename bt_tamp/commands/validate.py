@@ -1,9 +1,10 @@
 """Check scene files: format, names, goal, that nothing overlaps or floats, and that the arm can start there.
 
-The first fault is told in one line.
+Each file's first fault is told in one line.
 """
 
 import argparse
+import sys
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,17 +16,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def call(arguments: argparse.Namespace) -> int:
-    """One line a file; ends with an error at the first one that can't be used."""
+    """One line a file; 2 if any of them can't be used."""
     from bt_tamp.commands.choices import check_start
-    from bt_tamp.errors import refusing
+    from bt_tamp.errors import UserError, one_line_of
+    from scenarios.errors import SceneError
     from scenarios.load import load_scenario
 
+    code = 0
     for file in arguments.files:
-        with refusing(ValueError):
+        try:
             scenario = load_scenario(file, arguments.seed)
-        check_start(scenario, file)
+            check_start(scenario, file)
+        except (UserError, SceneError, ValueError) as error:
+            print(f"bt-tamp: {one_line_of(error)}", file=sys.stderr)
+            code = 2
+            continue
         print(f"{file}: scene {scenario.name!r} is fine; {_counted(len(scenario.bodies))}; goal {scenario.goal}")
-    return 0
+    return code
 
 
 def _counted(bodies: int) -> str:

@@ -81,6 +81,16 @@ def test_every_shipped_scene_is_listed_and_valid(capsys: pytest.CaptureFixture[s
     assert main(["validate", *names]) == 0
 
 
+def test_every_file_is_validated_also_after_one_that_is_not_fine(tmp_path, capfd):
+    (tmp_path / "bad.yaml").write_text("version: 1\n")
+    assert main(["validate", str(tmp_path / "bad.yaml"), str(tmp_path / "none.yaml"), "fig1"]) == 2
+    said = capfd.readouterr()
+    first, second = said.err.splitlines()
+    assert "bad.yaml" in first
+    assert "none.yaml" in second
+    assert said.out.startswith("fig1: scene 'fig1' is fine")
+
+
 def test_the_schema_is_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == 0
     assert "objects" in json.loads(capsys.readouterr().out)["properties"]
