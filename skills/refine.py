@@ -5,8 +5,9 @@ from py_trees.common import Status
 
 from planner.failure import RefinementFailure, SceneChanged
 from planner.motion.motion_planner import MotionPlanner
-from planner.refinement import Phase, Refinement
+from planner.refinement import Refinement
 from sim.scene import SceneState
+from skills.contact_guard import ContactGuard
 from skills.context import ActionRun, SkillContext
 from skills.payload import load_of
 from skills.watching import Watch
@@ -102,39 +103,27 @@ class Refine(Behaviour):
         return Status.FAILURE
 
 
-class PathFree(Behaviour):
-    """Is the rest of the running motion still free, and until contact what it is for still there? For motions in
-    contact, which can't simply begin anew."""
+class PathFree(ContactGuard):
+    """Is the rest of the running motion still free, and until contact what it is for still there?"""
 
     def __init__(self, run: ActionRun, context: SkillContext, motion: MotionPlanner) -> None:
-        super().__init__("path free?")
-        self._run, self._context, self._motion = run, context, motion
+        super().__init__("path free?", run, context)
+        self._motion = motion
         self._watch: Watch | None = None
 
     def terminate(self, new_status: Status) -> None:
         if new_status == Status.INVALID:
             self._watch = None
 
-    def update(self) -> Status:
-        context, refinement = self._context, self._run.refinement
-        if refinement is None or not context.is_watchful:
-            return Status.SUCCESS
+    def what_changed(self, refinement: Refinement) -> str | None:
+        context = self._context
         if self._watch is None:
             self._watch = Watch(self._motion, refinement, context.scene)
         phase = self._run.running(context.phase)
         if phase is None:
-            return Status.SUCCESS
-        changed = self._what_changed(self._watch, phase)
-        if changed is None:
-            return Status.SUCCESS
-        context.fail(SceneChanged(self._run.action, changed, refinement.sample))
-        self.feedback_message = changed
-        return Status.FAILURE
-
-    def _what_changed(self, watch: Watch, phase: Phase) -> str | None:
-        context = self._context
-        blocked = watch.path_blocked(context.scene, phase, context.controller.time_in_reference)
+            return None
+        blocked = self._watch.path_blocked(context.scene, phase, context.controller.time_in_reference)
         if blocked is not None:
             return blocked.reason
         is_coming = phase.kind == "touch" and not context.controller.contact
-        return watch.object_shifted(context.scene) if is_coming else None
+        return self._watch.object_shifted(context.scene) if is_coming else None

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 
 import numpy as np
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from planner.failure import SceneChanged
+from planner.refinement import Refinement
 from planner.task.facts import place_of
 from scenarios.shapes import middle
 from sim.scene import SceneState
+from skills.contact_guard import ContactGuard
 from skills.context import ActionRun, SkillContext
 from skills.gathering import Place
 from skills.strokes import Stroke, is_lost
@@ -21,7 +21,7 @@ LOST_FOR = 0.06
 """Seconds for which a crumb must be seen out of the stroke: poses are noisy."""
 
 
-class CrumbInStroke(Behaviour):
+class CrumbInStroke(ContactGuard):
     """Does the rest of the stroke still take along the crumb that it is for? For motions in contact: how far the stroke
     has come is seen from where the sponge is.
 
@@ -30,8 +30,8 @@ class CrumbInStroke(Behaviour):
     """
 
     def __init__(self, run: ActionRun, context: SkillContext, where: Callable[[SceneState], Place | None]) -> None:
-        super().__init__("crumb in stroke?")
-        self._run, self._context, self._where = run, context, where
+        super().__init__("crumb in stroke?", run, context)
+        self._where = where
         self._forget()
 
     def _forget(self) -> None:
@@ -44,18 +44,8 @@ class CrumbInStroke(Behaviour):
         if new_status == Status.INVALID:
             self._forget()
 
-    def update(self) -> Status:
-        context, refinement = self._context, self._run.refinement
-        if refinement is None or not context.is_watchful:
-            return Status.SUCCESS
-        changed = self._what_changed(refinement.sample.stroke, refinement.sample.pressing.speed)
-        if changed is None:
-            return Status.SUCCESS
-        context.fail(SceneChanged(self._run.action, changed, refinement.sample))
-        self.feedback_message = changed
-        return Status.FAILURE
-
-    def _what_changed(self, stroke: Stroke, speed: float) -> str | None:
+    def what_changed(self, refinement: Refinement) -> str | None:
+        stroke, speed = refinement.sample.stroke, refinement.sample.pressing.speed
         name, _, pan = self._run.action.args[:3]
         scene, now = self._context.scene, self._context.observation.t
         if name not in scene.poses:
