@@ -38,7 +38,9 @@ OVERHANGS = (0.06, 0.075, 0.09, 0.045)
 SLANTS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
 """Directions of drags off the edge's normal."""
 
-SHORTEST = 0.01
+SHORTEST = 0.02
+"""Metres that a drag takes the object at least: after less it would count as lying where it lay."""
+
 LEFT_OVER = 0.3
 """Fraction of the overhang that may be missing after a drag."""
 

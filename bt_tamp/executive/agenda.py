@@ -1,5 +1,6 @@
 """The plan in force: its steps, which one runs, and the tree `act` that carries out the rest."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 
 from py_trees.behaviour import Behaviour
@@ -7,12 +8,16 @@ from py_trees.common import Status
 from py_trees.composites import Sequence
 
 from bt_tamp.executive.validity import still_good_while
+from planner.failure import EffectMissing
 from planner.refinement import Refinement
 from planner.task.symbols import Fact, GroundAction, TaskPlan, resume_at
 from sim.scene import SceneState
 from skills.context import ActionRun, SkillContext
 from skills.motions import sequence
 from skills.skill import Skill
+
+MAX_UNDONE = 1
+"""How often, at most, an action whose effect isn't there right after it is simply done again."""
 
 
 class Agenda:
@@ -48,6 +53,8 @@ class Agenda:
         self._refinements: tuple[Refinement, ...] = ()
         self._running = 0
         self._sound: tuple[int, bool, frozenset[Fact]] | None = None
+        self._just_done: tuple[int, ActionRun] | None = None
+        self._undone: Counter[GroundAction] = Counter()
 
     @property
     def goal(self) -> frozenset[Fact]:
@@ -102,7 +109,7 @@ class Agenda:
         """Put the plan out of force and stop what runs."""
         self.plan = None
         self.act.stop(Status.INVALID)
-        self.is_between_actions = True
+        self.is_between_actions, self._just_done = True, None
 
     def review(self, context: SkillContext) -> str | None:
         """Why the plan is no longer in force, or None; skips and redoes steps as the observed facts ask."""
@@ -123,12 +130,37 @@ class Agenda:
             self._sound = self._running, False, facts
             return None
         k = resume_at(self.plan, facts)
+        missing = self._missing_effect(self.plan, k, facts)
+        if missing is not None:
+            context.fail(missing)
+            return missing.reason
         if k is None:
             return "what is left of the plan no longer leads to the goal"
         if k != self._running:
             self._build_from(k, context, "skipped" if k > self._running else "redone")
         self._sound = self._running, True, facts
         return None
+
+    def _missing_effect(self, plan: TaskPlan, k: int | None, facts: frozenset[Fact]) -> EffectMissing | None:
+        """That what was just done doesn't have the effect that the plan rests on, again. k: where the plan would go
+        on.
+
+        Once it may have been undone at that very moment. A skill whose own end and whose effect in PDDL differ would
+        be done again for ever.
+        """
+        just_done, self._just_done = self._just_done, None
+        if just_done is None:
+            return None
+        index, run = just_done
+        lacking = sorted(plan.steps[index].adds - facts)
+        if not lacking or (k is not None and k > index):
+            self._undone.pop(run.action, None)
+            return None
+        self._undone[run.action] += 1
+        if self._undone[run.action] <= MAX_UNDONE:
+            return None
+        told = f"{run.action} came to its end, and {', '.join(map(str, lacking))} does not hold"
+        return EffectMissing(run.action, told, run.refinement.sample if run.refinement else None)
 
     def _what_changed(self, scene: SceneState) -> str:
         """Why the plan in force is for something else than what is wanted now."""
@@ -151,6 +183,7 @@ class Agenda:
             self._done(run.refinement)
         if self.plan is not None:
             self.executed.append(self.plan.steps[self._running].action)
+            self._just_done = self._running, run
         self._running += 1
         self.is_between_actions = True
 

@@ -46,6 +46,9 @@ AT_REST = 0.02
 ARRIVED = 0.03
 """Joint error in rad below which position mode counts as arrived."""
 
+HAND_RADIUS = 0.2
+"""Metres around the tool centre that hand and held things take up."""
+
 APPROACH_SPEED = 0.02
 """Metres per second at which a reference until contact meets a surface: a stiff one answers with a force of
 speed · √(stiffness · moved mass), 5 N for the sponge."""
@@ -58,11 +61,13 @@ slip: from 1.1 rad/s, neither books nor wedges moved in the hand by 0.5 mm or 0.
 @dataclass(frozen=True)
 class TrackingError:
     """How far the arm is from its reference now: the tool's position in metres (without the pressed
-    direction) and rotation in rad, and the largest joint error in rad."""
+    direction) and rotation in rad, the largest joint error in rad, and the most by which any one joint's error
+    displaces the hand with what it holds, in metres."""
 
     position: float
     rotation: float
     joint: float
+    hand: float
 
 
 class ArmController:
@@ -206,13 +211,15 @@ class ArmController:
     @property
     def tracking_error(self) -> TrackingError:
         if self._state is None:
-            return TrackingError(0.0, 0.0, 0.0)
+            return TrackingError(0.0, 0.0, 0.0, 0.0)
         q, v, a = self._course.now()
         error = pose_error(self._dynamics.target(q, v, a), self._state)
         if self._pressed:
             error[:3] -= self._normal * (self._normal @ error[:3])
-        joint = float(np.abs(q - self._state.q).max())
-        return TrackingError(float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])), joint)
+        joints = np.abs(q - self._state.q)
+        hand = joints * (np.linalg.norm(self._state.J[:3], axis=0) + HAND_RADIUS)
+        position, rotation = float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
+        return TrackingError(position, rotation, float(joints.max()), float(hand.max()))
 
     @property
     def collision(self) -> Collision | None:

@@ -170,6 +170,19 @@ def test_what_was_undone_is_done_again_without_a_new_plan():
     assert world.log.count("plan") == 1
 
 
+def test_an_action_that_ends_without_its_effect_is_done_once_more_and_then_fails():
+    world = World()
+    world.retract = -1
+    told = []
+    world.context.fail = lambda failure: (told.append(failure), setattr(world.context, "failure", failure))
+    while world.log.count("plan") < 2:
+        world.tick()
+    assert world.log.count("end a") == 2
+    assert [str(failure.action) for failure in told] == ["go(start, a)"]
+    assert told[0].kind == "EffectMissing"
+    assert told[0].reason == "go(start, a) came to its end, and at(a) does not hold"
+
+
 def test_the_running_action_counts_as_done_while_its_own_facts_are_in_between():
     world = World()
     while "begin b" not in world.log:

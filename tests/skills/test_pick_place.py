@@ -29,6 +29,13 @@ def test_a_standing_box_is_picked_and_placed_in_a_bin_wherever_it_stands(x, y, y
     assert place_of(bench.scene, "box") == "right_bin"
 
 
+def test_a_wrist_that_rubs_with_3_newton_metres_is_not_taken_for_one_that_is_held():
+    bench = Bench(scene_with("box", seed=1), seed=1)
+    bench.plant.set_joint_friction(3.0 * np.eye(7)[6])
+    assert bench.do("pick(box, table)") is Status.SUCCESS
+    assert bench.do("place(box, right_bin)") is Status.SUCCESS
+
+
 def test_a_held_object_can_be_put_down_on_the_table():
     bench = Bench(scene_with("box"))
     assert bench.do("pick(box, table)") is Status.SUCCESS
