@@ -15,5 +15,7 @@ def lacking(domain: Domain, facts: Collection[Fact], missing: Collection[Fact]) 
     for action in domain.actions:
         if wanted.intersection(fact.predicate for fact in action.adds):
             absent = [fact for fact in action.preconditions if fact.predicate not in possible]
-            found |= {f"{action.name} needs {fact}, which holds of nothing here": None for fact in absent}
+            types = {parameter.name: f"some {parameter.type}" for parameter in action.parameters}
+            told = [Fact(fact.predicate, tuple(types.get(arg, arg) for arg in fact.args)) for fact in absent]
+            found |= {f"{action.name} needs {fact}, which holds of nothing here": None for fact in told}
     return list(found)

@@ -239,7 +239,7 @@ def test_an_error_in_our_own_code_ends_a_run_with_a_whole_folder(
         (
             "  pea: {shape: {box: [0.02, 0.02, 0.02]}, mass: 0.01, pose: {on: table, xy: [0.6, 0.1]}}",
             "(in_bin pea tray)",
-            "wipe needs is_sponge(?with), which holds of nothing here",
+            "wipe needs is_sponge(some tool), which holds of nothing here",
         ),
     ],
 )
