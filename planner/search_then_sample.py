@@ -145,6 +145,20 @@ class SearchThenSample:
         situation, first = Situation.now(scene), self._samples.get(action, ())
         return self._actions.refine(action, situation, rng, self._budget, work, first=first)[0]
 
+    def attainable(self, scene: SceneState, goal: frozenset[Fact], work: Work) -> frozenset[Fact]:
+        """Those literals of a goal that hold, or to which, each taken alone, the task planner finds a way by all that
+        was learned."""
+        self._stated = None
+        self.learned.observe(scene)
+        known = self.facts(scene)
+        return frozenset(f for f in goal if f in known or self._has_way(scene, f, work))
+
+    def _has_way(self, scene: SceneState, literal: Fact, work: Work) -> bool:
+        domain, problem = self._posed(scene, frozenset({literal}), self.learned, 0)
+        found = self._solved(write_domain(domain), write_problem(problem), problem)
+        work.add("expansions", found.expansions)
+        return isinstance(found, TaskPlan)
+
     def learn(self, failure: RefinementFailure | ExecutionFailure, scene: SceneState) -> None:
         """Take in a failure met while acting; `scene` is as observed."""
         self._stated = None
@@ -201,9 +215,7 @@ class SearchThenSample:
         self, scene: SceneState, goal: frozenset[Fact], learned: Learned, work: Work, number: int
     ) -> tuple[Problem, TaskPlan | NoTaskPlan]:
         """State what is believed, given what was learned, and let the task planner search."""
-        objects = {n: kind for n, kind in self._objects(scene).items() if n not in self._domain.constants}
-        stated = Problem(f"round-{number}", self._domain.name, objects, self._facts(scene, learned), goal)
-        domain, problem = with_constraints(self._domain, stated, learned.constraints())
+        domain, problem = self._posed(scene, goal, learned, number)
         texts = write_domain(domain), write_problem(problem)
         found = self._solved(*texts, problem)
         if isinstance(found, TaskPlan):
@@ -215,6 +227,12 @@ class SearchThenSample:
         kind = "round" if learned is self.learned else "proof_sought"
         self._report(kind, {**event, "expansions": found.expansions})
         return problem, found
+
+    def _posed(self, scene: SceneState, goal: frozenset[Fact], learned: Learned, number: int) -> tuple[Domain, Problem]:
+        """The planner's question in a scene, given what was learned."""
+        objects = {n: kind for n, kind in self._objects(scene).items() if n not in self._domain.constants}
+        stated = Problem(f"round-{number}", self._domain.name, objects, self._facts(scene, learned), goal)
+        return with_constraints(self._domain, stated, learned.constraints())
 
     def _failure(self, found: NoTaskPlan) -> str:
         """Why it isn't known whether there is a plan; "" if there is none."""

@@ -46,6 +46,8 @@ SEEN_EVERY = 10
 """Steps between two looks at the bodies: 100 Hz, a fast camera. Joints, fingers and wrist are sensed at each step."""
 
 FLOOR_FRICTION = 0.8
+FLOOR_SIZE = 40.0
+"""Metres: what is thrown away comes to rest somewhere, too."""
 GEAR_STIFFNESS = 2e4
 """N/m between the fingers' slides. PyBullet's own gear constraint (JOINT_GEAR) would be felt by the wrist
 sensor as if it were an outside force: 13 N with the fingers pressed against their stops."""
@@ -291,7 +293,7 @@ class BulletPlant:
         floor = floor_height(scenario)
         self._add(
             "floor",
-            Box((4.0, 4.0, 0.1)),
+            Box((FLOOR_SIZE, FLOOR_SIZE, 0.1)),
             SE3(np.eye(3), np.array([0.0, 0.0, floor - 0.05])),
             FLOOR_FRICTION,
             0.0,

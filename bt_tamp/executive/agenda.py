@@ -24,7 +24,8 @@ class Agenda:
     """What is to be done, and how far it has come.
 
     `goal` is what is wanted; `late` bodies are not counted before they were seen (`order` is all that was asked for,
-    `unseen` those of them that are still to come). Without `is_watchful` the first plan is
+    `unseen` those of them that are still to come). What there is no way to can be `put_off` until the rest is done;
+    `has_begun`: a plan has been in force. Without `is_watchful` the first plan is
     carried out whatever is seen, and nothing is skipped or done again. `facts` states a believed scene
     in the planner's predicates. `rebuilt` is called whenever `act` has new children, `done`
     with what was carried out to its effect.
@@ -50,6 +51,9 @@ class Agenda:
         self._rebuilt = rebuilt
         self._done = done
         self.order, self.unseen = goal, late
+        self.put_off: frozenset[Fact] = frozenset()
+        self.has_begun = False
+        self._released: frozenset[Fact] = frozenset()
         self._refinements: tuple[Refinement, ...] = ()
         self._running = 0
         self._sound: tuple[int, bool, frozenset[Fact]] | None = None
@@ -66,13 +70,15 @@ class Agenda:
         self.order = goal
 
     def look_out(self, scene: SceneState) -> None:
-        """What comes late is asked for as soon as it is there."""
+        """What comes late is asked for as soon as it is there, and what was put off once the rest is done."""
         self.unseen = self.unseen - scene.poses.keys()
+        if self.put_off and self.is_between_actions and self.pursued(scene) <= self.facts(scene):
+            self.put_off, self._released = frozenset(), self.put_off
 
     def pursued(self, scene: SceneState) -> frozenset[Fact]:
-        """The part of the goal that can be worked on: what it is about is to be seen."""
-        bodies = scene.scenario.bodies
-        return frozenset(f for f in self.goal if all(arg in scene.poses for arg in f.args if arg in bodies))
+        """The part of the goal that is worked on: what it is about is to be seen, and it isn't put off."""
+        wanted, bodies = self.goal - self.put_off, scene.scenario.bodies
+        return frozenset(f for f in wanted if all(arg in scene.poses for arg in f.args if arg in bodies))
 
     def missing(self, scene: SceneState) -> tuple[str, ...]:
         """Bodies that should be there and are nowhere to be seen."""
@@ -103,6 +109,7 @@ class Agenda:
     def adopt(self, plan: TaskPlan, refinements: tuple[Refinement, ...], context: SkillContext, why: str) -> None:
         """Put a new plan in force: the old tree is stopped, then replaced."""
         self.plan, self._refinements, self._sound = plan, refinements, None
+        self.has_begun, self._released = True, frozenset()
         self._build_from(0, context, why)
 
     def drop(self) -> None:
@@ -170,7 +177,10 @@ class Agenda:
             return f"{', '.join(gone)} can't be seen any more"
         if not self.plan.goal <= self.goal:
             return "something else is wanted now"
-        come = sorted({fact.args[0] for fact in self.pursued(scene) - self.plan.goal})
+        more = self.pursued(scene) - self.plan.goal
+        come = sorted({fact.args[0] for fact in more})
+        if more <= self._released:
+            return f"the rest is done, and a way for {', '.join(come)} is looked for once more"
         return f"{', '.join(come)} {'is' if len(come) == 1 else 'are'} to be seen now, and wanted"
 
     def begin(self) -> None:

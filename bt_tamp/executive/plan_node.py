@@ -1,7 +1,7 @@
 """The planner node: feeds back what failed, plans from what is observed now, and rebuilds `act`."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from py_trees.behaviour import Behaviour
@@ -71,6 +71,11 @@ class Planner:
         thinking.plans += 1
         return outcome
 
+    def attainable(self, scene: SceneState, goal: frozenset[Fact]) -> frozenset[Fact]:
+        """The literals of a goal that hold, or to each of which alone there is a way by all that was learned."""
+        with self.thinking as thinking:
+            return self.search.attainable(scene, goal, thinking.work)
+
     def refine(self, action: GroundAction, scene: SceneState) -> tuple[Refinement | RefinementFailure, float]:
         """One action refined again in the scene as it is believed now, and the simulated seconds it costs."""
         with self.thinking as thinking:
@@ -82,25 +87,28 @@ class Planner:
 class PlanNode(Behaviour):
     """Plans once everything is at rest, lets the simulated time that this costs pass, then puts the plan in force.
 
-    Fails when there is no plan; `planner.thinking.verdict` says why. While something is nowhere to be seen, it waits
-    for that to turn up first.
+    Fails when there is no plan; `planner.thinking.verdict` says why. Once the robot is at work it first does what there
+    is a way to, and looks once more for a way to the rest then. While something is nowhere to be seen, it waits for
+    that to turn up first.
     """
 
     def __init__(self, planner: Planner, agenda: Agenda, context: SkillContext) -> None:
         super().__init__("plan")
         self._planner, self._agenda, self._context = planner, agenda, context
         self._outcome: Solution | NoPlan | None = None
-        self._since = 0.0
+        self._since = self._settling_since = 0.0
         self._ready_at = 0.0
         self._why = "planned"
         self._waits_for: tuple[str, ...] = ()
         self._scene = context.scene
         self._pursued: frozenset[Fact] = frozenset()
+        self._owed = 0.0
+        self._put_off_because = ""
 
     def initialise(self) -> None:
         self._outcome = None
         self._waits_for = ()
-        self._since = self._context.observation.t
+        self._since = self._settling_since = self._context.observation.t
 
     def update(self) -> Status:
         context, thinking = self._context, self._planner.thinking
@@ -111,17 +119,21 @@ class PlanNode(Behaviour):
                 self._outcome, self._waits_for = None, ()
         if self._outcome is None:
             observation = context.observation
-            if moving(observation) and observation.t - self._since < PATIENCE:
+            if moving(observation) and observation.t - self._settling_since < PATIENCE:
                 return Status.RUNNING
             self._take_in_failure()
             before = thinking.simulated_cost()
             self._scene, self._pursued = context.scene, self._agenda.pursued(context.scene)
             self._outcome = self._planner.plan(context.scene, self._agenda)
-            self._ready_at = context.observation.t + thinking.simulated_cost() - before
+            self._ready_at = context.observation.t + thinking.simulated_cost() - before + self._owed
+            self._owed = 0.0
         if context.observation.t < self._ready_at:
             return Status.RUNNING
         if isinstance(self._outcome, NoPlan):
             if self._has_changed(context.scene):
+                self._outcome, self._settling_since = None, context.observation.t
+                return Status.RUNNING
+            if self._puts_off(self._outcome):
                 self._outcome = None
                 return Status.RUNNING
             missing = self._agenda.missing(context.scene)
@@ -131,6 +143,9 @@ class PlanNode(Behaviour):
                 return Status.RUNNING
             if missing:
                 self._outcome = nowhere_to_be_seen(missing, self._outcome)
+            if self._put_off_because:
+                earlier = f"before, {self._put_off_because}" if self._agenda.put_off else "the rest is done"
+                self._outcome = replace(self._outcome, reason=f"{self._outcome.reason}; {earlier}")
             thinking.verdict = self._outcome
             self.feedback_message = self._outcome.reason
             return Status.FAILURE
@@ -144,6 +159,22 @@ class PlanNode(Behaviour):
         self._agenda.adopt(solution.plan, solution.refinements, context, self._why)
         self._why = "replanned"
         return Status.SUCCESS
+
+    def _puts_off(self, outcome: NoPlan) -> bool:
+        """Is there a way to a part of what is wanted? Then that is done first, and the rest put off."""
+        agenda, scene, thinking = self._agenda, self._context.scene, self._planner.thinking
+        if not agenda.has_begun:
+            return False
+        before = thinking.simulated_cost()
+        attainable = self._planner.attainable(scene, self._pursued)
+        self._owed += thinking.simulated_cost() - before
+        hopeless = self._pursued - attainable
+        if not hopeless or attainable <= agenda.facts(scene):
+            return False
+        agenda.put_off |= hopeless
+        self._put_off_because = outcome.reason
+        self._context.report("put_off", goal=[str(fact) for fact in sorted(hopeless)], reason=outcome.reason)
+        return True
 
     def _has_changed(self, scene: SceneState) -> bool:
         """Is the scene, or what is wanted, no longer what was planned for? Then what was found says nothing."""
@@ -163,7 +194,7 @@ class PlanNode(Behaviour):
         reason = self._agenda.review(context)
         if isinstance(failure, (ExecutionFailure, RefinementFailure)):
             self._planner.search.learn(failure, context.scene)
-        if self._planner.thinking.plans:
+        if failure is not None or self._agenda.plan is not None:
             context.report("replan", reason=reason)
         self._agenda.drop()
         context.failure = None

@@ -49,6 +49,7 @@ def entering(start: RunState, seams: Seams) -> Seams:
 def take_up(machine: Machine, start: RunState) -> None:
     """Hold still, and close the fingers on what they held."""
     context, plant = machine.context, machine.plant
+    machine.agenda.has_begun = True
     if start.held is None:
         context.grip.open_to(start.opening)
     else:

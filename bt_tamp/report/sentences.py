@@ -31,6 +31,8 @@ def sentence(event: Event) -> str | None:
             return f"{data['action']} is worked out anew: {data['reason']}"
         case "pressed_harder":
             return f"{data['action']} slips: pressed with {data['force']:.0f} N from now on"
+        case "put_off":
+            return f"no way to {', '.join(data['goal'])}: the rest is done first"
         case "replan":
             return f"planning again: {data['reason']}"
         case "disturbed":

@@ -120,6 +120,10 @@ class _Teller:
         reason = "" if data["reason"] == self._last_failure else f", because {data['reason']}"
         self._say(f"The plan was dropped{reason}, and a new one sought from what was observed then.")
 
+    def _put_off(self, event: Event, data: Any) -> None:
+        self._is_planning = False
+        self._say(f"There was no way to {', '.join(data['goal'])}: {data['reason']}. The rest was to be done first.")
+
     def _disturbed(self, event: Event, data: Any) -> None:
         during = f"{data['action']} in its phase {data['phase']!r}" if data.get("action") else repr(data["phase"])
         meanwhile = ", while planning" if data["phase"] == "planning" else f", during {during}"
