@@ -18,6 +18,7 @@ from bt_tamp.executive.seams import Seams
 from planner.refinement import Phase
 from planner.task.symbols import GroundAction
 from scenarios.goal import goal_text, parse_goal
+from scenarios.names import TABLE
 from scenarios.scenario import Body, Scenario
 from scenarios.shapes import Box
 from sim.disturbance import FOREVER
@@ -86,20 +87,39 @@ def _before_tool(to_come: Prospect) -> bool:
 
 
 def _before_cornered(to_come: Prospect) -> bool:
-    """Is anything still to be taken up that lies otherwise once it is turned on the spot?"""
-    return any(has_corners(body, body.X_WO.rotation) for body in _untouched(to_come))
+    """Is anything still to be taken up from the table that lies otherwise once it is turned on the spot?"""
+    return any(has_corners(body, body.X_WO.rotation) for body in _untouched(to_come, TABLE))
 
 
 def _before_tall(to_come: Prospect) -> bool:
-    """Is anything still to be taken up that can lie flatter than it stands?"""
-    return any(can_topple(body, body.X_WO.rotation) for body in _untouched(to_come))
+    """Is anything still to be taken up from the table that can lie flatter than it stands?"""
+    return any(can_topple(body, body.X_WO.rotation) for body in _untouched(to_come, TABLE))
 
 
-def _untouched(to_come: Prospect) -> list[Body]:
-    """What is to be taken up, and the hand isn't at it yet."""
-    picked = [action.args[0] for action in to_come.later if action.name == "pick"]
-    is_taken = to_come.phase.kind in ("open", "close") or to_come.phase.held is not None
-    return [to_come.scenario.bodies[name] for name in picked[1 if is_taken else 0 :]]
+def _before_last(to_come: Prospect) -> bool:
+    """Is there anything on the table still to be dealt with that the hand isn't at yet?"""
+    return any(action.args[1:2] == (TABLE,) and action.args[0] != to_come.phase.held for action in _ahead(to_come))
+
+
+def _before_needed_tool(to_come: Prospect) -> bool:
+    """Is a tool itself wanted somewhere, or still to be wiped with?"""
+    bodies = to_come.scenario.bodies
+    names = {name for _, args in parse_goal(to_come.scenario.goal) for name in args}
+    is_wanted = any(bodies[name].tool for name in names & bodies.keys())
+    return is_wanted or any(action.name == "wipe" for action in to_come.later[1:])
+
+
+def _untouched(to_come: Prospect, place: str | None = None) -> list[Body]:
+    """What is to be taken up from a place (None: any), and the hand isn't at it yet."""
+    picks = [action for action in _ahead(to_come) if action.name == "pick" and place in (None, *action.args[1:])]
+    return [to_come.scenario.bodies[action.args[0]] for action in picks]
+
+
+def _ahead(to_come: Prospect) -> tuple[GroundAction, ...]:
+    """The actions whose objects the hand isn't at yet."""
+    phase = to_come.phase
+    is_taken = phase.kind in ("open", "close") or phase.held is not None
+    return to_come.later[1:] if is_taken else to_come.later
 
 
 def _unchanged(scenario: Scenario) -> Scenario:
@@ -165,7 +185,7 @@ def _failing_task_planner(rng: np.random.Generator, strike: Strike) -> Seams:
 
 
 KINDS: dict[str, Kind] = {
-    "moved": Kind(world.moved),
+    "moved": Kind(world.moved, _before_last),
     "rotated": Kind(world.rotated, _before_cornered),
     "toppled": Kind(world.toppled, _before_tall),
     "taken-and-returned": Kind(world.taken_and_returned),
@@ -201,7 +221,7 @@ KINDS: dict[str, Kind] = {
     "motion-budget": Kind(seams=_exhausted_motion_planner),
     "task-planner": Kind(seams=_failing_task_planner),
     "taken-for-good": Kind(world.taken_for_good),
-    "sponge-out-of-reach": Kind(world.sponge_out_of_reach),
+    "sponge-out-of-reach": Kind(world.sponge_out_of_reach, _before_needed_tool),
 }
 assert KINDS.keys() == CLASSES.keys()
 

@@ -302,15 +302,19 @@ def goal_changed(now: Occasion) -> Deed | None:
     agenda = now.machine.agenda
     facts = agenda.facts(now.machine.context.scene)
     bins = sorted(name for name, region in now.scenario.regions.items() if region.kind == "bin")
-    changeable = [f for f in sorted(agenda.goal - facts) if f.predicate == "in_bin" and f.args[1] in bins]
+    planned = {action.args[0]: action.args[1] for action in now.left if action.name == "place"}
+    places = {
+        fact: fact.args[1] if fact.predicate == "in_bin" else planned.get(fact.args[0], "some bin")
+        for fact in sorted(agenda.goal - facts)
+        if fact.predicate in ("in_bin", "put_away")
+    }
+    changeable = [f for f, place in places.items() if f.predicate == "put_away" or place in bins]
     for fact in _shuffled(now, changeable):
-        others = [name for name in bins if name != fact.args[1]]
+        others = [name for name in bins if name != places[fact]]
         if others:
-            other = others[int(now.rng.integers(len(others)))]
-            wanted = agenda.goal - {fact} | {Fact("in_bin", (fact.args[0], other))}
-            return Deed(
-                f"{fact.args[0]} is wanted in {other} instead of {fact.args[1]}", goal=wanted, names=(fact.args[0],)
-            )
+            name, other = fact.args[0], others[int(now.rng.integers(len(others)))]
+            wanted = agenda.goal - {fact} | {Fact("in_bin", (name, other))}
+            return Deed(f"{name} is wanted in {other} instead of {places[fact]}", goal=wanted, names=(name,))
     return None
 
 

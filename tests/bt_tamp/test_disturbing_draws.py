@@ -1,5 +1,6 @@
 """What a class draws can be dealt with, as it declares."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from bt_tamp.disturb import driver
 from bt_tamp.disturb.classes import KINDS, Kind, Prospect
 from bt_tamp.disturb.deed import Deed, Later, Occasion
 from bt_tamp.disturb.driver import Driver
-from bt_tamp.disturb.world import brought_back, crumbs_beside_pan, knocked_from_hand, moved, rotated
+from bt_tamp.disturb.world import brought_back, crumbs_beside_pan, goal_changed, knocked_from_hand, moved, rotated
 from bt_tamp.executive.build import build
 from bt_tamp.options import RunOptions
 from planner.motion.motion_planner import MotionPlanner
@@ -57,21 +58,30 @@ def test_a_crumb_is_put_where_a_stroke_can_take_it(draw):
     assert found >= 10
 
 
+def action(text):
+    """`pick(cup, table)` as an action."""
+    name, args = text.rstrip(")").split("(")
+    return GroundAction(name, tuple(args.split(", ")))
+
+
 @pytest.mark.parametrize(
     ("name", "left", "may_come"),
     [
-        ("rotated", ("wipe(carrot)", "pick(box)"), True),
-        ("rotated", ("pick(box)", "place(box)"), True),
-        ("rotated", ("wipe(carrot)", "wipe(tomato)"), False),
-        ("toppled", ("pick(book)", "place(book)", "pick(box)"), True),
-        ("toppled", ("pick(book)", "place(book)", "pick(sponge)"), False),
-        ("sponge-far", ("pick(book)", "pick(sponge)"), True),
-        ("sponge-far", ("pick(book)", "place(book)"), False),
+        ("rotated", ("wipe(carrot, table)", "pick(box, table)"), True),
+        ("rotated", ("pick(box, table)", "place(box, right_bin)"), True),
+        ("rotated", ("wipe(carrot, table)", "wipe(tomato, table)"), False),
+        ("rotated", ("pick(sponge, dustpan)", "wipe(carrot, table)"), False),
+        ("toppled", ("pick(book, table)", "place(book, right_bin)", "pick(box, table)"), True),
+        ("toppled", ("pick(book, table)", "place(book, right_bin)", "pick(sponge, dustpan)"), False),
+        ("sponge-far", ("pick(book, table)", "pick(sponge, dustpan)"), True),
+        ("sponge-far", ("pick(book, table)", "place(book, right_bin)"), False),
+        ("moved", ("pick(sponge, dustpan)", "wipe(carrot, table)"), True),
+        ("moved", ("pick(sponge, dustpan)", "place(sponge, left_bin)"), False),
     ],
 )
 def test_a_class_waits_for_no_phase_after_which_there_is_nothing_for_it_to_do(name, left, may_come):
     scenario = load_scenario("fig1")
-    actions = tuple(GroundAction(text.partition("(")[0], (text[text.index("(") + 1 : -1],)) for text in left)
+    actions = tuple(map(action, left))
     still = Phase("go", "move", Trajectory.standstill(np.zeros(7)), 0.1)
     assert KINDS[name].fits(Prospect(still, actions, scenario)) is may_come
 
@@ -80,6 +90,20 @@ def test_what_the_fingers_are_about_to_close_on_is_not_to_come():
     scenario = load_scenario("fig1")
     closing = Phase("close", "close", Trajectory.standstill(np.zeros(7)), 0.1)
     assert not KINDS["rotated"].fits(Prospect(closing, (GroundAction("pick", ("box", "table")),), scenario))
+
+
+@pytest.mark.parametrize(
+    ("goal", "left", "may_come"),
+    [
+        ("(in_bin sponge left_bin)", ("place(box, right_bin)",), True),
+        ("(in_bin box right_bin)", ("place(box, right_bin)", "wipe(carrot, table)"), True),
+        ("(in_bin box right_bin)", ("wipe(carrot, table)", "place(sponge, left_bin)"), False),
+    ],
+)
+def test_a_sponge_is_thrown_away_for_good_only_while_something_needs_it(goal, left, may_come):
+    scenario = replace(load_scenario("fig1"), goal=goal)
+    still = Phase("go", "move", Trajectory.standstill(np.zeros(7)), 0.1)
+    assert KINDS["sponge-out-of-reach"].fits(Prospect(still, tuple(map(action, left)), scenario)) is may_come
 
 
 def test_what_is_knocked_from_the_hand_is_sure_to_matter():
@@ -147,3 +171,21 @@ def test_what_is_owed_comes_however_often_there_was_nothing_to_do(monkeypatch):
         machine.plant.step()
     machine.plant.close()
     assert told == ["it went", "it came back"]
+
+
+@pytest.mark.parametrize(
+    ("goal", "told"),
+    [
+        ("(in_bin box right_bin)", "box is wanted in left_bin instead of right_bin"),
+        ("(put_away box)", "box is wanted in (left|right)_bin instead of some bin"),
+    ],
+)
+def test_another_bin_is_wanted_for_what_belongs_in_one_or_in_any(goal, told):
+    scenario = replace(load_scenario("fig1"), goal=goal)
+    machine = build(scenario, RunOptions(), lambda kind, **data: None, lambda why: None)
+    now = Occasion(0.0, machine.plant.observe(), machine, MotionPlanner(machine.robot), np.random.default_rng(0))
+    deed = goal_changed(now)
+    machine.plant.close()
+    assert deed is not None
+    assert re.fullmatch(told, deed.sentence)
+    assert {fact.predicate for fact in deed.goal} == {"in_bin"}
