@@ -258,7 +258,9 @@ def totals(runs: Sequence[Run]) -> list[str]:
             for is_reachable, what in ((True, "reached a goal that can be"), (False, "told rightly that it can't be"))
             if (reachable := [run for run in met if run.is_reachable == is_reachable])
         ]
-        parts.append(f"{sum(run.outcome in UNFINISHED for run in mine)} crashed, {broken} torques broke a limit")
+        parts.append(
+            f"{sum(run.outcome in UNFINISHED for run in mine)} crashed or hung, {broken} torques broke a limit"
+        )
         parts.append(f"peak {peak:.1f} N")
         way = "watching" if replan else "open loop"
         told.append(f"{way}: {len(met)} of {len(mine)} disturbed runs were met; {'; '.join(parts)}")

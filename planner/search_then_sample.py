@@ -7,7 +7,7 @@ number of times; infeasible is only called what follows from proofs.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -69,12 +69,16 @@ class Solution:
 
 @dataclass(frozen=True)
 class NoPlan:
-    """No plan: "proven" that there is none, or none found within the "budget"; why, and what is in the way."""
+    """No plan: "proven" that there is none, or none found within the "budget"; why, and what is in the way.
+
+    attainable: those literals of the goal that hold, or that nothing learned keeps from being reached, each for itself.
+    """
 
     verdict: Literal["proven", "budget"]
     reason: str
     culprits: frozenset[str]
     rounds: int
+    attainable: frozenset[Fact] = frozenset()
 
 
 class SearchThenSample:
@@ -122,6 +126,8 @@ class SearchThenSample:
         self._actions.begin()
         try:
             outcome = self._rounds(scene, goal, rng, work)
+            if isinstance(outcome, NoPlan):
+                outcome = replace(outcome, attainable=self._attainable(scene, goal, work))
         finally:
             self.learned.forget_predicted()
         if isinstance(outcome, Solution):
@@ -144,20 +150,6 @@ class SearchThenSample:
         self.learned.observe(scene)
         situation, first = Situation.now(scene), self._samples.get(action, ())
         return self._actions.refine(action, situation, rng, self._budget, work, first=first)[0]
-
-    def attainable(self, scene: SceneState, goal: frozenset[Fact], work: Work) -> frozenset[Fact]:
-        """Those literals of a goal that hold, or to which, each taken alone, the task planner finds a way by all that
-        was learned."""
-        self._stated = None
-        self.learned.observe(scene)
-        known = self.facts(scene)
-        return frozenset(f for f in goal if f in known or self._has_way(scene, f, work))
-
-    def _has_way(self, scene: SceneState, literal: Fact, work: Work) -> bool:
-        domain, problem = self._posed(scene, frozenset({literal}), self.learned, 0)
-        found = self._solved(write_domain(domain), write_problem(problem), problem)
-        work.add("expansions", found.expansions)
-        return isinstance(found, TaskPlan)
 
     def learn(self, failure: RefinementFailure | ExecutionFailure, scene: SceneState) -> None:
         """Take in a failure met while acting; `scene` is as observed."""
@@ -210,6 +202,16 @@ class SearchThenSample:
                 self._widen()
                 met.clear()
         return self._no_plan(f"no plan within {settings.max_rounds} rounds", settings.max_rounds)
+
+    def _attainable(self, scene: SceneState, goal: frozenset[Fact], work: Work) -> frozenset[Fact]:
+        known = self._facts(scene, self.learned)
+        return frozenset(fact for fact in goal if fact in known or self._may_be_reached(scene, fact, work))
+
+    def _may_be_reached(self, scene: SceneState, literal: Fact, work: Work) -> bool:
+        domain, problem = self._posed(scene, frozenset({literal}), self.learned, 0)
+        found = self._solved(write_domain(domain), write_problem(problem), problem)
+        work.add("expansions", found.expansions)
+        return isinstance(found, TaskPlan) or not found.exhausted
 
     def _search(
         self, scene: SceneState, goal: frozenset[Fact], learned: Learned, work: Work, number: int

@@ -42,7 +42,7 @@ SHORTEST = 0.02
 """Metres that a drag takes the object at least: after less it would count as lying where it lay."""
 
 LEFT_OVER = 0.3
-"""Fraction of the overhang that may be missing after a drag."""
+"""Fraction of the overhang, and of the way, that may be missing after a drag."""
 
 MAX_TIPS = 8
 """Ways to press that are tried for one end pose."""
@@ -168,7 +168,10 @@ class Drag:
                 return False
             body, table = scene.scenario.bodies[name], scene.scenario.table
             out = standing_out(body, scene.poses[name], table, pull.end.edge)
-            return out > (1.0 - LEFT_OVER) * pull.end.overhang
+            tow = run.phase("drag").trajectory
+            start, end = (context.robot.X_WG(q).translation for q in (tow.at(0.0)[0], tow.end))
+            way = float(np.linalg.norm(end - start))
+            return out > pull.end.overhang - LEFT_OVER * min(pull.end.overhang, way)
 
         return towing_tree(self._kit.motion, run, context, self.predict, stands_out)
 

@@ -16,7 +16,7 @@ from bt_tamp.disturb.robot import moved_unseen
 from bt_tamp.disturb.world import can_topple, has_corners
 from bt_tamp.executive.seams import Seams
 from planner.refinement import Phase
-from planner.task.symbols import GroundAction
+from planner.task.symbols import Fact, GroundAction
 from scenarios.goal import goal_text, parse_goal
 from scenarios.names import TABLE
 from scenarios.scenario import Body, Scenario
@@ -26,11 +26,12 @@ from sim.disturbance import FOREVER
 
 @dataclass(frozen=True)
 class Prospect:
-    """A phase that is to come, the actions from its own on, and the scene."""
+    """A phase that is to come, the actions from its own on, the scene, and what is wanted."""
 
     phase: Phase
     later: tuple[GroundAction, ...]
     scenario: Scenario
+    goal: frozenset[Fact]
 
 
 Fits = Callable[[Prospect], bool]
@@ -98,14 +99,15 @@ def _before_tall(to_come: Prospect) -> bool:
 
 def _before_last(to_come: Prospect) -> bool:
     """Is there anything on the table still to be dealt with that the hand isn't at yet?"""
-    return any(action.args[1:2] == (TABLE,) and action.args[0] != to_come.phase.held for action in _ahead(to_come))
+    held = to_come.phase.held
+    names = {action.args[0] for action in _ahead(to_come) if action.args[1:2] == (TABLE,)}
+    return bool(names - ({held.name} if held is not None else set()))
 
 
 def _before_needed_tool(to_come: Prospect) -> bool:
     """Is a tool itself wanted somewhere, or still to be wiped with?"""
     bodies = to_come.scenario.bodies
-    names = {name for _, args in parse_goal(to_come.scenario.goal) for name in args}
-    is_wanted = any(bodies[name].tool for name in names & bodies.keys())
+    is_wanted = any(bodies[name].tool for fact in to_come.goal for name in fact.args if name in bodies)
     return is_wanted or any(action.name == "wipe" for action in to_come.later[1:])
 
 
@@ -117,9 +119,10 @@ def _untouched(to_come: Prospect, place: str | None = None) -> list[Body]:
 
 def _ahead(to_come: Prospect) -> tuple[GroundAction, ...]:
     """The actions whose objects the hand isn't at yet."""
-    phase = to_come.phase
-    is_taken = phase.kind in ("open", "close") or phase.held is not None
-    return to_come.later[1:] if is_taken else to_come.later
+    phase, running = to_come.phase, to_come.later[0]
+    is_held = phase.held is not None and phase.held.name == running.args[0]
+    is_coming = phase.kind == "move" or phase.name == "approach"
+    return to_come.later if is_coming and not is_held else to_come.later[1:]
 
 
 def _unchanged(scenario: Scenario) -> Scenario:

@@ -116,17 +116,19 @@ class Driver:
             for coming in self._coming:
                 self._meet(coming, t, action, phase)
 
-    def close(self, t: float) -> None:
-        """The run is over, at t (s): tell what did not come."""
+    def close(self) -> None:
+        """The run is over: tell what did not come."""
         for coming in [*self._given_up, *self._coming]:
-            is_due = coming.due is not None and coming.due <= t
             if coming.is_owed:
                 continue
             if coming.moment is None:
-                sentence = why_drawn(coming.name, coming.tries)
+                sentence = why_drawn(coming.name, coming.tries, coming.due is not None)
             else:
-                sentence = why_declared(coming.number, coming.moment, coming.met, is_due, self._began)
+                sentence = why_declared(coming.number, coming.moment, coming.met, coming.tries, self._began)
             self.report("never_came", name=coming.name, sentence=sentence)
+        for name in self.classes:
+            if KINDS[name].draw is None and name not in self._struck:
+                self.report("never_came", name=name, sentence=why_drawn(name, 0, True))
 
     def _stream(self, name: str) -> np.random.Generator:
         return np.random.default_rng([self.seed, 13, crc32(name.encode())])
@@ -162,7 +164,7 @@ class Driver:
                     # Once the last thing is let go of, there is nothing left that could go wrong.
                     if refinement is refinements[-1] and phase.name == refinement.phases[-1].name:
                         break
-                    if coming.kind.fits(Prospect(phase, later, scenario)):
+                    if coming.kind.fits(Prospect(phase, later, scenario, agenda.goal)):
                         spots = kinds.setdefault((refinement.action.name, phase.name), [])
                         spots.append((str(refinement.action), phase.name))
             if kinds:
@@ -258,4 +260,8 @@ class Driver:
 
 def _is_fit(kind: Kind | None, now: Occasion) -> bool:
     """May it come now? What found nothing to do in the phase it was drawn for comes in another of its kind."""
-    return kind is None or now.phase is None or kind.fits(Prospect(now.phase, now.left, now.scenario))
+    return (
+        kind is None
+        or now.phase is None
+        or kind.fits(Prospect(now.phase, now.left, now.scenario, now.machine.agenda.goal))
+    )

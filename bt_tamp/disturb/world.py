@@ -1,6 +1,6 @@
 """What is done to the world: each function draws one instance of its class for an occasion."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TypeVar
@@ -303,19 +303,26 @@ def goal_changed(now: Occasion) -> Deed | None:
     facts = agenda.facts(now.machine.context.scene)
     bins = sorted(name for name, region in now.scenario.regions.items() if region.kind == "bin")
     planned = {action.args[0]: action.args[1] for action in now.left if action.name == "place"}
-    places = {
-        fact: fact.args[1] if fact.predicate == "in_bin" else planned.get(fact.args[0], "some bin")
-        for fact in sorted(agenda.goal - facts)
-        if fact.predicate in ("in_bin", "put_away")
-    }
-    changeable = [f for f, place in places.items() if f.predicate == "put_away" or place in bins]
-    for fact in _shuffled(now, changeable):
-        others = [name for name in bins if name != places[fact]]
+    changeable = {}
+    for fact in sorted(agenda.goal - facts):
+        place = fact.args[1] if fact.predicate == "in_bin" else planned.get(fact.args[0], "")
+        if fact.predicate in ("in_bin", "put_away") and place in bins:
+            changeable[fact.args[0]] = place
+    for name in _shuffled(now, list(changeable)):
+        place = changeable[name]
+        others = [other for other in bins if other != place and _takes_as_much(now.scenario.regions, other, place)]
         if others:
-            name, other = fact.args[0], others[int(now.rng.integers(len(others)))]
-            wanted = agenda.goal - {fact} | {Fact("in_bin", (name, other))}
-            return Deed(f"{name} is wanted in {other} instead of {places[fact]}", goal=wanted, names=(name,))
+            other = others[int(now.rng.integers(len(others)))]
+            wanted = frozenset(fact for fact in agenda.goal if fact.args[:1] != (name,)) | {
+                Fact("in_bin", (name, other))
+            }
+            return Deed(f"{name} is wanted in {other} instead of {place}", goal=wanted, names=(name,))
     return None
+
+
+def _takes_as_much(regions: Mapping[str, Region], other: str, place: str) -> bool:
+    sizes = sorted(regions[other].size[:2]), sorted(regions[place].size[:2])
+    return all(a >= b for a, b in zip(*sizes, strict=True))
 
 
 def regions_now(now: Occasion) -> dict[str, Region]:

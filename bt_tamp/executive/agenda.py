@@ -24,8 +24,8 @@ class Agenda:
     """What is to be done, and how far it has come.
 
     `goal` is what is wanted; `late` bodies are not counted before they were seen (`order` is all that was asked for,
-    `unseen` those of them that are still to come). What there is no way to can be `put_off` until the rest is done;
-    `has_begun`: a plan has been in force. Without `is_watchful` the first plan is
+    `unseen` those of them that are still to come). What there is no way to can be `put_off` until the rest is done
+    (`has_put_off`: some was, once); `has_begun`: a plan has been in force. Without `is_watchful` the first plan is
     carried out whatever is seen, and nothing is skipped or done again. `facts` states a believed scene
     in the planner's predicates. `rebuilt` is called whenever `act` has new children, `done`
     with what was carried out to its effect.
@@ -52,7 +52,7 @@ class Agenda:
         self._done = done
         self.order, self.unseen = goal, late
         self.put_off: frozenset[Fact] = frozenset()
-        self.has_begun = False
+        self.has_begun = self.has_put_off = False
         self._released: frozenset[Fact] = frozenset()
         self._refinements: tuple[Refinement, ...] = ()
         self._running = 0
@@ -159,28 +159,32 @@ class Agenda:
         if just_done is None:
             return None
         index, run = just_done
-        lacking = sorted(plan.steps[index].adds - facts)
+        # What a step does to others is a side effect, foreseen but not promised.
+        lacking = sorted(fact for fact in plan.steps[index].adds - facts if {*fact.args} <= {*run.action.args})
         if not lacking or (k is not None and k > index):
             self._undone.pop(run.action, None)
             return None
         self._undone[run.action] += 1
         if self._undone[run.action] <= MAX_UNDONE:
             return None
-        told = f"{run.action} came to its end, and {', '.join(map(str, lacking))} does not hold"
+        del self._undone[run.action]
+        told = f"it came to its end, and without effect: {', '.join(map(str, lacking))} missing"
         return EffectMissing(run.action, told, run.refinement.sample if run.refinement else None)
 
     def _what_changed(self, scene: SceneState) -> str:
         """Why the plan in force is for something else than what is wanted now."""
         assert self.plan is not None
-        gone = sorted({fact.args[0] for fact in self.plan.goal & self.goal - self.pursued(scene)})
+        gone = _about(self.plan.goal & self.goal - self.pursued(scene))
         if gone:
             return f"{', '.join(gone)} can't be seen any more"
         if not self.plan.goal <= self.goal:
             return "something else is wanted now"
         more = self.pursued(scene) - self.plan.goal
-        come = sorted({fact.args[0] for fact in more})
+        come = _about(more)
         if more <= self._released:
-            return f"the rest is done, and a way for {', '.join(come)} is looked for once more"
+            return f"the rest is done, and a way for {', '.join(come) or 'it'} is looked for once more"
+        if not come:
+            return "something else is wanted now"
         return f"{', '.join(come)} {'is' if len(come) == 1 else 'are'} to be seen now, and wanted"
 
     def begin(self) -> None:
@@ -211,6 +215,11 @@ class Agenda:
             self.act.add_child(sequence(name, Begin(self, action, context), subtree, Complete(self, run, context)))
         self.act.add_child(Waiting())
         self._rebuilt(why)
+
+
+def _about(literals: frozenset[Fact]) -> list[str]:
+    """What literals are about: their first arguments."""
+    return sorted({name for fact in literals for name in fact.args[:1]})
 
 
 class Begin(Behaviour):

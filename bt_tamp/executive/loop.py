@@ -141,7 +141,7 @@ def run_scenario(
     result = _result(machine, scenario, ending, audits, tally)
     recorder.tree(machine.mission.root, "end", tally.results)
     if driver is not None:
-        driver.close(tally.t)
+        driver.close()
     report("run_ended", outcome=result.outcome, sentence=result.reason)
     recorder.finish(result, state_of(machine))
     machine.plant.close()

@@ -71,11 +71,6 @@ class Planner:
         thinking.plans += 1
         return outcome
 
-    def attainable(self, scene: SceneState, goal: frozenset[Fact]) -> frozenset[Fact]:
-        """The literals of a goal that hold, or to each of which alone there is a way by all that was learned."""
-        with self.thinking as thinking:
-            return self.search.attainable(scene, goal, thinking.work)
-
     def refine(self, action: GroundAction, scene: SceneState) -> tuple[Refinement | RefinementFailure, float]:
         """One action refined again in the scene as it is believed now, and the simulated seconds it costs."""
         with self.thinking as thinking:
@@ -102,12 +97,12 @@ class PlanNode(Behaviour):
         self._waits_for: tuple[str, ...] = ()
         self._scene = context.scene
         self._pursued: frozenset[Fact] = frozenset()
-        self._owed = 0.0
-        self._put_off_because = ""
+        self._put_off: set[frozenset[Fact]] = set()
 
     def initialise(self) -> None:
         self._outcome = None
         self._waits_for = ()
+        self._put_off = set()
         self._since = self._settling_since = self._context.observation.t
 
     def update(self) -> Status:
@@ -125,27 +120,25 @@ class PlanNode(Behaviour):
             before = thinking.simulated_cost()
             self._scene, self._pursued = context.scene, self._agenda.pursued(context.scene)
             self._outcome = self._planner.plan(context.scene, self._agenda)
-            self._ready_at = context.observation.t + thinking.simulated_cost() - before + self._owed
-            self._owed = 0.0
+            self._ready_at = context.observation.t + thinking.simulated_cost() - before
         if context.observation.t < self._ready_at:
             return Status.RUNNING
         if isinstance(self._outcome, NoPlan):
             if self._has_changed(context.scene):
                 self._outcome, self._settling_since = None, context.observation.t
                 return Status.RUNNING
-            if self._puts_off(self._outcome):
-                self._outcome = None
-                return Status.RUNNING
             missing = self._agenda.missing(context.scene)
             if missing and not self._is_out_of_patience():
                 self._waits_for = missing
                 context.report("missing", bodies=list(missing))
                 return Status.RUNNING
+            if self._does_the_rest_first(self._outcome):
+                self._outcome = None
+                return Status.RUNNING
             if missing:
                 self._outcome = nowhere_to_be_seen(missing, self._outcome)
-            if self._put_off_because:
-                earlier = f"before, {self._put_off_because}" if self._agenda.put_off else "the rest is done"
-                self._outcome = replace(self._outcome, reason=f"{self._outcome.reason}; {earlier}")
+            if self._agenda.has_put_off and self._outcome.attainable <= self._agenda.facts(context.scene):
+                self._outcome = replace(self._outcome, reason=f"{self._outcome.reason}; the rest is done")
             thinking.verdict = self._outcome
             self.feedback_message = self._outcome.reason
             return Status.FAILURE
@@ -160,21 +153,21 @@ class PlanNode(Behaviour):
         self._why = "replanned"
         return Status.SUCCESS
 
-    def _puts_off(self, outcome: NoPlan) -> bool:
-        """Is there a way to a part of what is wanted? Then that is done first, and the rest put off."""
-        agenda, scene, thinking = self._agenda, self._context.scene, self._planner.thinking
+    def _does_the_rest_first(self, outcome: NoPlan) -> bool:
+        """Once the robot is at work: put off what there is no way to, if there may be one to the rest; and if there is
+        none to the rest either, look for one to everything once more."""
+        agenda, facts = self._agenda, self._agenda.facts(self._context.scene)
         if not agenda.has_begun:
             return False
-        before = thinking.simulated_cost()
-        attainable = self._planner.attainable(scene, self._pursued)
-        self._owed += thinking.simulated_cost() - before
-        hopeless = self._pursued - attainable
-        if not hopeless or attainable <= agenda.facts(scene):
-            return False
-        agenda.put_off |= hopeless
-        self._put_off_because = outcome.reason
-        self._context.report("put_off", goal=[str(fact) for fact in sorted(hopeless)], reason=outcome.reason)
-        return True
+        hopeless = self._pursued - outcome.attainable
+        if hopeless and hopeless | agenda.put_off not in self._put_off and not outcome.attainable <= facts:
+            agenda.put_off |= hopeless
+            agenda.has_put_off = True
+            self._put_off.add(agenda.put_off)
+            self._context.report("put_off", goal=[str(fact) for fact in sorted(hopeless)], reason=outcome.reason)
+            return True
+        was_put_off, agenda.put_off = agenda.put_off, frozenset()
+        return bool(was_put_off)
 
     def _has_changed(self, scene: SceneState) -> bool:
         """Is the scene, or what is wanted, no longer what was planned for? Then what was found says nothing."""
@@ -204,4 +197,4 @@ def nowhere_to_be_seen(missing: tuple[str, ...], outcome: NoPlan) -> NoPlan:
     """There is no plan, and this is missing: no proof, for it may turn up."""
     names = ", ".join(missing)
     reason = f"{names} {'is' if len(missing) == 1 else 'are'} nowhere to be seen; {outcome.reason}"
-    return NoPlan("budget", reason, outcome.culprits.union(missing), outcome.rounds)
+    return replace(outcome, verdict="budget", reason=reason, culprits=outcome.culprits.union(missing))

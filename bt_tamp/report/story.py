@@ -103,6 +103,7 @@ class _Teller:
         self._running = None
         start = self._started.get(data["action"], event.t)
         self._say(f"{data['action']}: {', '.join(self._phases)}.", f"{start:7.1f} – {event.t:5.1f} s  ")
+        self._phases = []
 
     def _action_failed(self, event: Event, data: Any) -> None:
         where = f" in its phase {self._phases[-1]!r}" if self._phases else ""

@@ -15,6 +15,7 @@ TOLD = frozenset(
         "learned",
         "action_failed",
         "refined_again",
+        "put_off",
         "replan",
         "goal_reached",
         "run_ended",

@@ -24,6 +24,7 @@ disturbances:
   - {phase: pregrasp, action: pick, take: {object: cube}}
   - {phase: pre-grasp, nth: 40, take: {object: cube}}
   - {at: 90, take: {object: cube}}
+  - {at: 0.3, bring: {object: cube}}
 """
 
 
@@ -87,6 +88,7 @@ def test_the_story_tells_what_was_declared_and_did_not_come(declared, capsys):
     assert "pre-grasp" in told.partition("those that did: ")[2].partition(".")[0]
     assert "Disturbances[7] of the scene did not come: phase 'pre-grasp' began " in told
     assert "Disturbances[8] of the scene did not come: the run was over before 90 s." in told
+    assert "Disturbances[9] of the scene did not come: there was nothing that it could be done to." in told
     assert "Disturbances[0]" not in told
 
 

@@ -180,7 +180,30 @@ def test_an_action_that_ends_without_its_effect_is_done_once_more_and_then_fails
     assert world.log.count("end a") == 2
     assert [str(failure.action) for failure in told] == ["go(start, a)"]
     assert told[0].kind == "EffectMissing"
-    assert told[0].reason == "go(start, a) came to its end, and at(a) does not hold"
+    assert told[0].reason == "it came to its end, and without effect: at(a) missing"
+
+
+def test_what_an_action_was_foreseen_to_do_to_others_is_not_missed():
+    world = World()
+    world.retract = -1
+    first, *rest = ROUTE.steps
+    elsewhere = Step(first.action, first.preconditions, frozenset({AT["c"]}), first.deletes)
+    world.route = TaskPlan((elsewhere, *rest), ROUTE.goal)
+    told = []
+    world.context.fail = told.append
+    world.tick(40)
+    assert world.log.count("end a") > 2
+    assert told == []
+
+
+@pytest.mark.parametrize("literal", [Fact("hand_empty"), Fact("at", ("a",))])
+def test_a_goal_that_gets_longer_replaces_the_plan_and_says_so(literal):
+    world = World()
+    while "begin a" not in world.log:
+        world.tick()
+    world.agenda.want(ROUTE.goal | {literal})
+    reason = world.agenda.review(world.context)
+    assert reason == ("something else is wanted now" if not literal.args else "a is to be seen now, and wanted")
 
 
 def test_the_running_action_counts_as_done_while_its_own_facts_are_in_between():
