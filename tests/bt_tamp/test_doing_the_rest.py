@@ -50,3 +50,21 @@ def test_before_anything_has_moved_it_is_told_at_once(tmp_path):
     (tmp_path / "two.yaml").write_text(SCENE.replace("mass: 0.3", "mass: 30.0", 1))
     assert main(["run", str(tmp_path / "two.yaml"), "--out", str(tmp_path / "run")]) == 10
     assert json.loads((tmp_path / "run" / "result.json").read_text())["executed"] == []
+
+
+def test_what_only_samples_speak_against_is_put_off_too(tmp_path):
+    covered = """
+  covered: {kind: bin, size: [0.3, 0.3, 0.13], wall: 0.01, pose: {xyz: [0.05, 0.62, -0.145]}}
+fixed:
+  lid: {shape: {box: [0.4, 0.4, 0.02]}, pose: {xyz: [0.05, 0.62, -0.03]}}
+objects:"""
+    goal = '{at: 0.6, goal: "(and (in_bin can covered) (in_bin jar crate))"}'
+    scene = SCENE.replace("\nobjects:", covered, 1).partition("disturbances:")[0] + f"disturbances:\n  - {goal}\n"
+    (tmp_path / "two.yaml").write_text(
+        scene.replace("goal: clear-table", 'goal: "(and (in_bin can crate) (in_bin jar crate))"')
+    )
+    code = main(["run", str(tmp_path / "two.yaml"), "--out", str(tmp_path / "run")])
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert code in (10, 11)
+    assert result["goal"] == {"in_bin(can, covered)": False, "in_bin(jar, crate)": True}
+    assert result["reason"].endswith("; the rest is done")
