@@ -15,28 +15,32 @@ from skills.watching import SHIFT, TURN
 @dataclass(frozen=True)
 class Stake:
     """What a run rests on, in truth: which bodies are there, where those lie that are still needed and lie about, where
-    the regions stand, what is wanted."""
+    the regions stand, what is wanted; and what of it is reached, as it is seen."""
 
     there: frozenset[str]
     poses: Mapping[str, SE3]
     regions: Mapping[str, SE3]
     goal: frozenset[Fact]
+    reached: frozenset[Fact]
 
     @staticmethod
     def of(now: Occasion) -> "Stake":
         """What is at stake at that moment."""
-        poses = dict(now.truth.poses)
+        poses, agenda = dict(now.truth.poses), now.machine.agenda
         needed = {*now.lying(), *now.tools()}
         return Stake(
             frozenset(poses),
             {name: poses[name] for name in sorted(needed & poses.keys())},
             now.truth.regions,
-            now.machine.agenda.order,
+            agenda.order,
+            agenda.goal & agenda.facts(now.machine.context.scene),
         )
 
     def is_hurt(self, after: "Stake", poses: Mapping[str, SE3]) -> bool:
         """Is it otherwise than it was? `poses`: where everything lies afterwards."""
         if (self.there, self.goal) != (after.there, after.goal) or self.regions != after.regions:
+            return True
+        if not self.reached <= after.reached:
             return True
         return any(have_parted(X_WO, poses[name]) for name, X_WO in self.poses.items())
 

@@ -8,6 +8,7 @@ from pinocchio import SE3
 
 from bt_tamp.disturb import driver
 from bt_tamp.disturb.classes import KINDS, Kind, Prospect
+from bt_tamp.disturb.consequence import Trial
 from bt_tamp.disturb.deed import Deed, Later, Occasion
 from bt_tamp.disturb.driver import Driver
 from bt_tamp.disturb.world import brought_back, crumbs_beside_pan, goal_changed, knocked_from_hand, moved, rotated
@@ -211,3 +212,22 @@ def test_another_bin_is_wanted_for_what_belongs_in_one_or_goes_into_one(goal):
     assert deed.sentence == f"box is wanted in {other} instead of {planned}"
     assert deed.goal == {Fact("in_bin", ("box", other))}
     assert (before is None) == goal.startswith("(put_away")
+
+
+def test_what_undoes_something_that_is_done_matters():
+    scenario = replace(load_scenario("fig1"), goal="(and (in_bin carrot table) (in_bin box right_bin))")
+    machine = build(scenario, RunOptions(), lambda kind, **data: None, lambda why: None)
+    plant, context = machine.plant, machine.context
+
+    def look():
+        for _ in range(20):
+            plant.step()
+            context.scene = machine.belief.update(plant.observe(), is_closing=False)
+        return Occasion(0.0, plant.observe(), machine, MotionPlanner(machine.robot), np.random.default_rng(0))
+
+    pan = scenario.regions["dustpan"].X_WR.translation + np.array([0.0, 0.0, 0.01])
+    trial = Trial.of(0, Deed("carrot fell into the pan", names=("carrot",)), look())
+    assert not trial.is_proven(look())
+    plant.put("carrot", SE3(np.eye(3), pan))
+    assert trial.is_proven(look())
+    plant.close()
