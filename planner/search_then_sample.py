@@ -295,7 +295,9 @@ class SearchThenSample:
             if isinstance(unhindered, TaskPlan) or not unhindered.exhausted:
                 return None
         missing = sorted(goal - self.facts(scene))
-        lost = sorted({fact.args[0] for fact in missing if fact.args and self._is_lost(scene, fact.args[0])})
+        concerned = {fact.args[0] for fact in missing if fact.args}
+        concerned |= {name for name, body in scene.scenario.bodies.items() if body.tool}
+        lost = sorted(name for name in concerned if self._is_lost(scene, name))
         reasons = [f"{name} lies neither on the table nor in a region" for name in lost] + proofs.sentences()
         reason = f"no sequence of actions leads to {', '.join(map(str, missing))}"
         reasons += lacking(self._domain, self.facts(scene), missing)

@@ -39,6 +39,12 @@ DEEPEST = -0.004
 FAR_ABOUT = 1.2
 """Times the straight way: where a path is longer, another is sought, and the shorter one taken."""
 
+HEMMED_IN = 0.015
+"""Metres within which something stands that hems the arm in at its start."""
+
+WITHDRAWN = (0.12, 0.2, 0.06)
+"""Metres by which the hand is drawn straight back from there, one after the other."""
+
 _CONTROL_SPACINGS = (0.3, 0.1)
 _ATTEMPTS = 3
 
@@ -205,8 +211,9 @@ class MotionPlanner:
         """A timed, audited, collision-free motion from scene.q to one of the goals (7,), or why there is none.
 
         Where the arm starts nearer to something than the margin (after a grasp, beside a bin's wall), that
-        pair may stay as near all the way, and hardly nearer. If there is no way with everything in place,
-        but one without the movable bodies, those in that way are the culprits.
+        pair may stay as near all the way, and hardly nearer; where it finds no way out, the hand is first drawn
+        straight back. If there is no way with everything in place, but one without the movable bodies, those in that
+        way are the culprits.
         """
         seed, ends = self._next_seed(), self.ends(scene, q_goals, allowed)
         if isinstance(ends, MotionFailure):
@@ -219,6 +226,8 @@ class MotionPlanner:
 
         for attempt in range(_ATTEMPTS):
             path = self._polyline(scene, ends, seed + attempt, max_checks, hopeless)
+            if path is None:
+                path = self._withdrawn(scene, ends, seed, max_checks)
             if path is None:
                 return walled_in() or self._blocked(scene, ends, seed, max_checks)
             trajectory = self._timed(scene, path, ends.margins)
@@ -291,6 +300,20 @@ class MotionPlanner:
                 path = path if other is None else min(path, other, key=path_length)
         self.work.add("checks" if isinstance(checker, FastChecker) else "exact_checks", checker.checks - before)
         return path
+
+    def _withdrawn(self, scene: SceneState, ends: Ends, seed: int, max_checks: int) -> np.ndarray | None:
+        """A path that draws the hand straight back first, from among what hems it in; None if nothing does."""
+        if not self._near(scene, scene.q, Margins(HEMMED_IN, ends.margins.allowed)):
+            return None
+        X_WG = self.robot.X_WG(scene.q)
+        for distance in WITHDRAWN:
+            line = self.line_from(scene.q, [X_WG, X_WG * SE3(np.eye(3), np.array([0.0, 0.0, -distance]))])
+            if line is None or self._contacts(scene, line, ends.margins):
+                continue
+            path = self._polyline(replace(scene, q=line[-1]), ends, seed, max_checks)
+            if path is not None:
+                return np.concatenate([line, path[1:]])
+        return None
 
     def _shortened(
         self, query: Query, checker: CollisionChecker, is_hopeless: Callable[[], bool] | None = None

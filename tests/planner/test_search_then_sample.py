@@ -454,6 +454,16 @@ def test_what_lies_on_the_floor_is_proven_out_of_reach_of_any_plan(tabletop, sta
     assert not run.of("widened")
 
 
+def test_a_tool_on_the_floor_is_named_where_it_is_needed(stand_in):
+    start = SceneState.initial(load_scenario("fig1"), 0.1)
+    fallen = start.moved("sponge", SE3(np.eye(3), np.array([0.0, -1.7, -0.6])))
+    outcome = Run(stand_in(rule())).plan(fallen, "(in_bin carrot dustpan)")
+    assert isinstance(outcome, NoPlan)
+    assert outcome.reason == (
+        "no sequence of actions leads to in_bin(carrot, dustpan): sponge lies neither on the table nor in a region"
+    )
+
+
 class Refusing:
     """A skill that proves that it can't."""
 

@@ -149,6 +149,18 @@ def test_the_arm_may_start_nearer_than_the_margin_but_come_no_nearer(robot, scen
     assert _clearance(robot, beside, trajectory, 0.001) == set()
 
 
+@pytest.mark.parametrize("room", [0.003, 0.006, 0.009])
+def test_a_hand_among_narrow_things_is_drawn_straight_back_first(robot, table, at, planner, down, room):
+    X_WO = at(0.05, -0.62, -0.17)
+    scenario = table([("block", Box((0.097, 0.05, 0.05)), X_WO)])
+    q = planner.ik(down(0.05, -0.62, -0.17, yaw_deg=180.0))[0]
+    start = SceneState(scenario, {"block": X_WO}, q, 0.05 + 2.0 * room)
+    moved = planner.move(start, [scenario.robot.q0])
+    assert isinstance(moved, Trajectory)
+    assert np.allclose(moved.end, scenario.robot.q0)
+    assert planner.audit(start, moved) is None
+
+
 def test_a_held_body_may_start_pressed_on_what_it_stands_on(sponge_in_hand, planner, down, goal):
     # The sponge reaches 2.5 cm below the fingertips, the table's top is at 5 cm.
     pressed = _touching(planner, down, sponge_in_hand, 0.6, 0.25, 0.074)
