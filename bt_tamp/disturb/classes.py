@@ -111,6 +111,12 @@ def _before_needed_tool(to_come: Prospect) -> bool:
     return is_wanted or any(action.name == "wipe" for action in to_come.later[1:])
 
 
+def _before_bin(to_come: Prospect) -> bool:
+    """Is a bin still needed?"""
+    bins = {name for name, region in to_come.scenario.regions.items() if region.kind == "bin"}
+    return any(not bins.isdisjoint(action.args[1:]) for action in to_come.later)
+
+
 def _untouched(to_come: Prospect, place: str | None = None) -> list[Body]:
     """What is to be taken up from a place (None: any), and the hand isn't at it yet."""
     picks = [action for action in _ahead(to_come) if action.name == "pick" and place in (None, *action.args[1:])]
@@ -191,7 +197,7 @@ KINDS: dict[str, Kind] = {
     "moved": Kind(world.moved, _before_last),
     "rotated": Kind(world.rotated, _before_cornered),
     "toppled": Kind(world.toppled, _before_tall),
-    "taken-and-returned": Kind(world.taken_and_returned),
+    "taken-and-returned": Kind(world.taken_and_returned, _before_last),
     "new-object": Kind(partial(world.new_one, name=STRAY), amend=partial(with_late, _STRAY, "bin")),
     "new-crumb": Kind(partial(world.new_one, name=CRUMB), amend=partial(with_late, _CRUMB, "dustpan")),
     "path-blocked": Kind(partial(world.path_blocked, name=POST), _moving, False, amend=partial(with_late, _POST, None)),
@@ -204,7 +210,7 @@ KINDS: dict[str, Kind] = {
     "sponge-covered": Kind(
         partial(world.sponge_covered, cover=STRAY), _before_tool, amend=partial(with_late, _STRAY, None)
     ),
-    "bin-shifted": Kind(world.bin_shifted),
+    "bin-shifted": Kind(world.bin_shifted, _before_bin),
     "crumbs-beside-pan": Kind(world.crumbs_beside_pan),
     "goal-changed": Kind(world.goal_changed),
     "push": Kind(robot.push),

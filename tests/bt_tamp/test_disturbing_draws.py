@@ -79,6 +79,9 @@ def action(text):
         ("sponge-far", ("pick(book, table)", "place(book, right_bin)"), False),
         ("moved", ("pick(sponge, dustpan)", "wipe(carrot, table)"), True),
         ("moved", ("pick(sponge, dustpan)", "place(sponge, left_bin)"), False),
+        ("taken-and-returned", ("pick(sponge, dustpan)", "place(sponge, left_bin)"), False),
+        ("bin-shifted", ("wipe(carrot, table, dustpan)", "place(sponge, left_bin)"), True),
+        ("bin-shifted", ("wipe(carrot, table, dustpan)", "place(sponge, table)"), False),
     ],
 )
 def test_a_class_waits_for_no_phase_after_which_there_is_nothing_for_it_to_do(name, left, may_come):
