@@ -185,7 +185,7 @@ class Agenda:
             return f"the rest is done, and a way for {', '.join(come) or 'it'} is looked for once more"
         if not come:
             return "something else is wanted now"
-        return f"{', '.join(come)} {'is' if len(come) == 1 else 'are'} to be seen now, and wanted"
+        return f"{', '.join(come)} {'is' if len(come) == 1 else 'are'} wanted now, too"
 
     def begin(self) -> None:
         """An action of the plan has started."""

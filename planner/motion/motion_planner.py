@@ -23,6 +23,7 @@ from planner.motion.recent import Recent
 from planner.motion.shortcut import shortened
 from planner.motion.timing import time_line, time_path, time_path_with_stops
 from planner.motion.trajectory import Trajectory
+from planner.motion.withdrawing import HEMMED_IN, lines_back
 from planner.motion.world import FREE_MARGIN, Margins, movables, obstacles
 from planner.refinement import Pair, Work, pairs
 from sim.robot import RobotModel
@@ -38,12 +39,6 @@ DEEPEST = -0.004
 
 FAR_ABOUT = 1.2
 """Times the straight way: where a path is longer, another is sought, and the shorter one taken."""
-
-HEMMED_IN = 0.015
-"""Metres within which something stands that hems the arm in at its start."""
-
-WITHDRAWN = (0.12, 0.2, 0.06)
-"""Metres by which the hand is drawn straight back from there, one after the other."""
 
 _CONTROL_SPACINGS = (0.3, 0.1)
 _ATTEMPTS = 3
@@ -305,12 +300,10 @@ class MotionPlanner:
         """A path that draws the hand straight back first, from among what hems it in; None if nothing does."""
         if not self._near(scene, scene.q, Margins(HEMMED_IN, ends.margins.allowed)):
             return None
-        X_WG = self.robot.X_WG(scene.q)
-        for distance in WITHDRAWN:
-            line = self.line_from(scene.q, [X_WG, X_WG * SE3(np.eye(3), np.array([0.0, 0.0, -distance]))])
-            if line is None or self._contacts(scene, line, ends.margins):
-                continue
-            path = self._polyline(replace(scene, q=line[-1]), ends, seed, max_checks)
+        for line in lines_back(self.robot, scene.q):
+            self.work.add("ik", len(line))
+            free = not self._contacts(scene, line, ends.margins)
+            path = self._polyline(replace(scene, q=line[-1]), ends, seed, max_checks) if free else None
             if path is not None:
                 return np.concatenate([line, path[1:]])
         return None

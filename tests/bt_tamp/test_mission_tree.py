@@ -203,7 +203,7 @@ def test_a_goal_that_gets_longer_replaces_the_plan_and_says_so(literal):
         world.tick()
     world.agenda.want(ROUTE.goal | {literal})
     reason = world.agenda.review(world.context)
-    assert reason == ("something else is wanted now" if not literal.args else "a is to be seen now, and wanted")
+    assert reason == ("something else is wanted now" if not literal.args else "a is wanted now, too")
 
 
 def test_the_running_action_counts_as_done_while_its_own_facts_are_in_between():
