@@ -8,7 +8,7 @@ from bt_tamp.sweep_results import Line, Run, scene_name
 
 RUN_COLUMNS = (
     "scene seed disturb replan outcome met succeeded robot_s replans peak_force_n disturbance action phase mattered "
-    "answer answered_after_s reacted_after_s reason command"
+    "answer answered_after_s reacted_after_s hidden_s reason command"
 ).split()
 
 
@@ -30,9 +30,10 @@ def write_csv(folder: Path, runs: Sequence[Run], lines: Sequence[Line]) -> list[
 
 def _row(run: Run) -> list[object]:
     result = run.result
-    first = result.disturbances[0] if result is not None and result.disturbances else None
+    befell = result.disturbances if result is not None else ()
+    first = next((one for one in befell if one.mattered), befell[0] if befell else None)
     figures = [None] * 3 if result is None else [result.robot_s, result.replans, result.peak_force_n]
-    names = ("sentence", "action", "phase", "mattered", "answer", "answered_after_s", "reacted_after_s")
+    names = ("sentence", "action", "phase", "mattered", "answer", "answered_after_s", "reacted_after_s", "hidden_s")
     told = [None if first is None else getattr(first, name) for name in names]
     known = [run.scene, run.seed, run.disturb, run.replan, run.outcome, run.is_met, run.succeeded]
     return [*known, *figures, *told, run.reason, run.command]

@@ -82,9 +82,9 @@ class Line:
 
     interval: 95 % of the success rate, by Wilson. lost_s: median of robot time beyond that of the undisturbed run of
     the same scene and seed, both having succeeded; lost_actions: the same as a multiple of the action that was undone.
-    reacted_s, slow_reacted_s: median and 95 % of the time until an action that was disturbed stood still or set out
-    anew, where that took no new plan; reactions: how many. peak_n: the largest true force. violations: torques beyond
-    their limit or NaN."""
+    reacted_s, slow_reacted_s: median and 95 % of the time, from when the sensors could show it, until an action that
+    was disturbed stood still or set out anew, where that took no new plan; reactions: how many. peak_n: the largest
+    true force. violations: torques beyond their limit or NaN."""
 
     scene: str
     disturb: str
@@ -206,12 +206,13 @@ def _line(key: tuple[str, str, bool], runs: Sequence[Run], usual: Mapping[tuple,
 
 
 def reactions_of(results: Iterable[RunResult]) -> list[float]:
-    """Seconds until an action that was disturbed stood still or set out anew, where that took no new task plan."""
+    """Seconds until an action that was disturbed stood still or set out anew, where that took no new task plan: from
+    when the sensors could show it."""
     return [
-        one.reacted_after_s
+        one.reacted_s
         for result in results
         for one in result.disturbances
-        if one.answer in WITHOUT_A_PLAN and one.reacted_after_s is not None
+        if one.answer in WITHOUT_A_PLAN and one.reacted_s is not None
     ]
 
 

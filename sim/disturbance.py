@@ -33,6 +33,10 @@ class Fault:
         """Is this so at t seconds?"""
         return self.start - HAIR <= t < self.end - HAIR
 
+    def hides_poses_for(self, t: float) -> float:
+        """Seconds from t on until sensors can show where a body lies that is moved at t."""
+        return 0.0
+
 
 @runtime_checkable
 class SensorFault(Protocol):
@@ -41,6 +45,8 @@ class SensorFault(Protocol):
     def holds_at(self, t: float) -> bool: ...
 
     def sense(self) -> Sense: ...
+
+    def hides_poses_for(self, t: float) -> float: ...
 
 
 @runtime_checkable
@@ -118,6 +124,11 @@ class DisturbedPlant:
                     seen = sense(seen)
             self._seen = seen
         return self._seen
+
+    def hides_poses_for(self) -> float:
+        """Seconds until the sensors can show where a body lies that is moved now."""
+        hidden = (fault.hides_poses_for(self._t) for fault, _ in self._sensors if fault.holds_at(self._t))
+        return max(hidden, default=0.0)
 
     def truth(self) -> Observation:
         """What faultless sensors would say now: for reports and benchmarks, and for whoever disturbs."""

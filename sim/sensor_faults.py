@@ -134,6 +134,9 @@ class PoseDelay(Fault):
     seconds: float
     names: frozenset[str] | None = None
 
+    def hides_poses_for(self, t: float) -> float:
+        return min(self.seconds, self.end - t)
+
     def sense(self) -> Sense:
         late = _Late[Observation](self.seconds)
 
@@ -155,6 +158,9 @@ class PoseMissing(Fault):
     """Bodies, all or those named, are not seen."""
 
     names: frozenset[str] | None = None
+
+    def hides_poses_for(self, t: float) -> float:
+        return self.end - t
 
     def sense(self) -> Sense:
         def blind(seen: Observation) -> Observation:

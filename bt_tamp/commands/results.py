@@ -3,9 +3,10 @@
 success: goal reached, or the right verdict where the class declares that it can't be; with its 95 % interval (Wilson).
 Runs that ended before anything that matters befell them are no success: they are left out, and counted as unmet.
 lost s: robot time beyond the undisturbed run of the same scene and seed, median; × action: as a multiple of the action
-that was undone. react s: from a disturbance of the running action until the arm stood still or set out anew, thinking
-included, where that took no new task plan: median / 95 %. peak N: the largest true force. broken: torques beyond their
-limit, or NaN. --together makes one line of all scenes' runs of a class.
+that was undone. react s: from when a disturbance of the running action could be seen (at once, but where poses come
+late or not at all) until the arm stood still or set out anew, thinking included, where that took no new task plan:
+median / 95 %. peak N: the largest true force. broken: torques beyond their limit, or NaN. --together makes one line of
+all scenes' runs of a class.
 """
 
 import argparse

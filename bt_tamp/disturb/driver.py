@@ -1,6 +1,7 @@
 """Does to a run what was declared or drawn: at a time, in a phase, while it plans. It sees everything, and only its own
 plant sees it."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -252,10 +253,16 @@ class Driver:
             phase=phase.name if phase is not None and running is not None else "planning",
             action=str(running or ""),
             mattered=deed.is_certain,
+            hidden_s=self._hidden_s() if deed.names else 0.0,
             is_urgent=running is not None
             and (deed.is_in_the_way or not frozenset(running.args).isdisjoint(deed.names)),
             shifts={fault.region: fault.by for fault in deed.faults if isinstance(fault, BinShifted)},
         )
+
+    def _hidden_s(self) -> float | None:
+        assert self._plant is not None
+        hidden = self._plant.hides_poses_for()
+        return hidden if math.isfinite(hidden) else None
 
 
 def _is_fit(kind: Kind | None, now: Occasion) -> bool:

@@ -86,4 +86,5 @@ def _befallen(t: float, data: Mapping[str, Any]) -> Befallen:
         bodies=tuple(data.get("bodies", ())),
         mattered=data.get("mattered", True),
         is_urgent=data.get("is_urgent", False),
+        hidden_s=data.get("hidden_s", 0.0),
     )

@@ -53,7 +53,8 @@ class Befallen:
 
     action: what ran then, "" while planning. bodies: what it was done to. mattered: it changed a fact or a geometry
     that the rest of the run rests on. is_urgent: it concerned the running action. reacted_after_s: if so, and the
-    action did answer, the seconds until the arm stood still or set out anew, thinking included.
+    action did answer, the seconds until the arm stood still or set out anew, thinking included. hidden_s: seconds after
+    which sensors that err could show it; None for never.
     """
 
     t: float
@@ -67,6 +68,14 @@ class Befallen:
     mattered: bool = True
     is_urgent: bool = False
     reacted_after_s: float | None = None
+    hidden_s: float | None = 0.0
+
+    @property
+    def reacted_s(self) -> float | None:
+        """`reacted_after_s`, counted from when the sensors could show it; 0 for what was felt before it was seen."""
+        if self.reacted_after_s is None:
+            return None
+        return max(0.0, self.reacted_after_s - (self.hidden_s or 0.0))
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,16 @@ def test_setting_out_anew_is_a_reaction_too():
     assert round(ledger.found[0].reacted_after_s, 6) == 0.1
 
 
+def test_a_reaction_counts_from_when_the_sensors_could_show_it():
+    for hidden, counted in ((0.0, 0.4), (0.3, 0.1), (0.5, 0.0), (None, 0.4)):
+        ledger = Ledger()
+        disturbed(ledger, 1.0, is_urgent=True, hidden_s=hidden)
+        ledger.hear("refined_again", 1.35, {})
+        ledger.look(1.4, is_still=True)
+        (one,) = ledger.found
+        assert (round(one.reacted_after_s, 6), round(one.reacted_s, 6)) == (0.4, counted)
+
+
 def test_what_comes_after_the_actions_end_answers_to_something_else():
     ledger = Ledger()
     disturbed(ledger, 1.0, is_urgent=True)

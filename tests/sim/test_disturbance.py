@@ -150,6 +150,18 @@ def test_poses_may_be_noisy_late_or_missing_each_for_some_bodies_only(make):
     assert set(gone[-1].poses) == set(gone[-1].velocities) == {"feather"}
 
 
+def test_late_and_missing_poses_tell_for_how_long_they_hide_what_is_moved_now(make):
+    plant = make(PoseDelay(0.3, start=0.01, end=1.0))
+    assert plant.hides_poses_for() == 0.0
+    watched(plant, 0.02)
+    assert plant.hides_poses_for() == pytest.approx(0.3)
+    plant.suffer(PoseMissing(start=0.0, end=0.5))
+    assert plant.hides_poses_for() == pytest.approx(0.48)
+    plant.suffer(PoseNoise(0.01))
+    plant.suffer(PoseMissing())
+    assert plant.hides_poses_for() == np.inf
+
+
 def test_a_joint_with_friction_sticks_below_it_and_slides_above(make):
     twist = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.8])
     rubbing = JointFriction((1.0,) * 7)
