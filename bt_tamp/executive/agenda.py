@@ -161,6 +161,8 @@ class Agenda:
         index, run = just_done
         # What a step does to others is a side effect, foreseen but not promised.
         lacking = sorted(fact for fact in plan.steps[index].adds - facts if {*fact.args} <= {*run.action.args})
+        if not lacking and run.refinement is not None:
+            self._done(run.refinement)
         if not lacking or (k is not None and k > index):
             self._undone.pop(run.action, None)
             return None
@@ -193,8 +195,6 @@ class Agenda:
 
     def complete(self, run: ActionRun) -> None:
         """The running action is done."""
-        if run.refinement is not None:
-            self._done(run.refinement)
         if self.plan is not None:
             self.executed.append(self.plan.steps[self._running].action)
             self._just_done = self._running, run

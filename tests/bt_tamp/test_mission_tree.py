@@ -70,7 +70,8 @@ class Plans(Behaviour):
         self.world.agenda.drop()
         self.world.context.failure = None
         self.world.fails = False
-        self.world.agenda.adopt(self.world.route, (None,) * len(self.world.route.steps), self.world.context, "planned")
+        refinements = tuple(SimpleNamespace(action=step.action, sample=None) for step in self.world.route.steps)
+        self.world.agenda.adopt(self.world.route, refinements, self.world.context, "planned")
         return Status.SUCCESS
 
 
@@ -86,7 +87,11 @@ class World:
         self.context = context
         steps = {step.action: step for step in ROUTE.steps}
         skill = SimpleNamespace(subtree=lambda run, _: Scripted(self, steps[run.action]))
-        self.agenda = Agenda(ROUTE.goal, {"go": skill}, lambda _: self.facts, lambda _: None, lambda _: None)
+        self.worked = []
+        self.agenda = Agenda(
+            *(ROUTE.goal, {"go": skill}, lambda _: self.facts, lambda _: None),
+            lambda refinement: self.worked.append(str(refinement.action)),
+        )
         self.mission = mission(self.agenda, context, Plans(self))
         self.t = 0.0
 
@@ -181,6 +186,16 @@ def test_an_action_that_ends_without_its_effect_is_done_once_more_and_then_fails
     assert [str(failure.action) for failure in told] == ["go(start, a)"]
     assert told[0].kind == "EffectMissing"
     assert told[0].reason == "it came to its end, and without effect: at(a) missing"
+    assert world.worked == []
+
+
+def test_an_action_has_worked_once_its_effect_is_there():
+    world = World()
+    while "end b" not in world.log:
+        world.tick()
+    assert world.worked == ["go(start, a)"]
+    world.until_done()
+    assert world.worked == ["go(start, a)", "go(a, b)", "go(b, c)"]
 
 
 def test_what_an_action_was_foreseen_to_do_to_others_is_not_missed():
