@@ -57,6 +57,7 @@ class Agenda:
         self._refinements: tuple[Refinement, ...] = ()
         self._running = 0
         self._sound: tuple[int, bool, frozenset[Fact]] | None = None
+        self._broken: str | None = None
         self._just_done: tuple[int, ActionRun] | None = None
         self._undone: Counter[GroundAction] = Counter()
 
@@ -108,36 +109,42 @@ class Agenda:
 
     def adopt(self, plan: TaskPlan, refinements: tuple[Refinement, ...], context: SkillContext, why: str) -> None:
         """Put a new plan in force: the old tree is stopped, then replaced."""
-        self.plan, self._refinements, self._sound = plan, refinements, None
+        self.plan, self._refinements, self._sound, self._broken = plan, refinements, None, None
         self.has_begun, self._released = True, frozenset()
         self._build_from(0, context, why)
 
     def drop(self) -> None:
         """Put the plan out of force and stop what runs."""
-        self.plan = None
+        self.plan = self._broken = None
         self.act.stop(Status.INVALID)
         self.is_between_actions, self._just_done = True, None
 
     def review(self, context: SkillContext) -> str | None:
-        """Why the plan is no longer in force, or None; skips and redoes steps as the observed facts ask."""
+        """Why the plan is no longer in force, or None; skips and redoes steps as the observed facts ask.
+
+        A plan that was found wanting stays so, for the tree that carries it out was stopped then.
+        """
         if context.failure is not None:
             return context.failure.reason
         if self.plan is None:
             return "there is no plan yet"
-        if not self.is_watchful:
-            return None
-        if self.plan.goal != self.pursued(context.scene):
+        if self.is_watchful and self._broken is None:
+            self._broken = self._look_at(self.plan, context)
+        return self._broken
+
+    def _look_at(self, plan: TaskPlan, context: SkillContext) -> str | None:
+        if plan.goal != self.pursued(context.scene):
             return self._what_changed(context.scene)
         facts = self.facts(context.scene)
         if (self._running, self.is_between_actions, facts) == self._sound:
             return None
         if not self.is_between_actions:
-            if not still_good_while(self.plan, self._running, facts):
+            if not still_good_while(plan, self._running, facts):
                 return f"after {self.running} the rest of the plan would no longer apply"
             self._sound = self._running, False, facts
             return None
-        k = resume_at(self.plan, facts)
-        missing = self._missing_effect(self.plan, k, facts)
+        k = resume_at(plan, facts)
+        missing = self._missing_effect(plan, k, facts)
         if missing is not None:
             context.fail(missing)
             return missing.reason

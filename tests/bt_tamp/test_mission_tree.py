@@ -64,6 +64,9 @@ class Plans(Behaviour):
         self.world = world
 
     def update(self):
+        if self.world.thinks > 0:
+            self.world.thinks -= 1
+            return Status.RUNNING
         self.world.log.append("plan")
         if self.world.route is None:
             return Status.FAILURE
@@ -81,7 +84,7 @@ class World:
     def __init__(self, facts=("start",)):
         self.facts = frozenset(AT[place] for place in facts)
         self.route, self.fails, self.ticks, self.retract, self.log = ROUTE, False, 3, 0, []
-        self.speed = 0.0
+        self.speed, self.thinks = 0.0, 0
         context = SimpleNamespace(scene=EMPTY, failure=None, report=lambda *_, **__: None, observation=None)
         context.fail = lambda failure: setattr(context, "failure", context.failure or failure)
         self.context = context
@@ -230,6 +233,21 @@ def test_the_running_action_counts_as_done_while_its_own_facts_are_in_between():
     assert world.log.count("plan") == 1
     world.facts = frozenset({AT["a"]})
     world.until_done()
+
+
+@pytest.mark.parametrize("until", ["begin b", "end b"])
+def test_a_plan_that_was_found_wanting_stays_out_of_force_even_if_it_comes_good_again(until):
+    world = World()
+    while until not in world.log:
+        world.tick()
+    world.thinks = 3
+    world.agenda.want(frozenset({AT["start"]}))
+    world.tick()
+    assert world.agenda.act.status is Status.INVALID
+    world.agenda.want(ROUTE.goal)
+    stopped = len(world.log)
+    world.until_done()
+    assert world.log[stopped] == "plan"
 
 
 def test_a_plan_whose_rest_no_longer_applies_is_replaced_and_the_old_tree_is_stopped_first():
