@@ -44,7 +44,8 @@ def late_ones(file: schema.SceneFile) -> frozenset[str]:
 
 def disturbance_problems(file: schema.SceneFile, scenario: Scenario) -> Iterator[Problem]:
     """Objects, regions, links and goals that the scene doesn't know."""
-    links = ROBOTS[scenario.robot.model].links
+    facts = ROBOTS[scenario.robot.model]
+    links = facts.links
     for number, entry in enumerate(file.disturbances):
         key = next(key for key in HAPPENINGS if getattr(entry, key) is not None)
         what, path = getattr(entry, key), ("disturbances", number, key)
@@ -56,6 +57,8 @@ def disturbance_problems(file: schema.SceneFile, scenario: Scenario) -> Iterator
             yield (*path, "region"), f"unknown region {region!r}, {known(region, scenario.regions)}"
         if entry.push is not None and entry.push.link is not None and entry.push.link not in links:
             yield (*path, "link"), f"unknown link {entry.push.link!r}, {known(entry.push.link, links)}"
+        if entry.push is not None and entry.push.link == facts.base:
+            yield (*path, "link"), f"link {facts.base!r} doesn't move: it stands on the floor"
         pose = entry.bring.pose if entry.bring is not None else None
         if isinstance(pose, PoseOn) and pose.on not in (surfaces := {TABLE, *scenario.regions}):
             yield (*path, "pose", "on"), f"unknown surface {pose.on!r}, {known(pose.on, surfaces)}"

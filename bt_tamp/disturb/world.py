@@ -121,6 +121,8 @@ def taken_and_returned(now: Occasion) -> Deed | None:
 def brought_back(now: Occasion, name: str, X_WO: SE3, since: float) -> Deed | None:
     """What was taken comes back, near X_WO; the longer after `since` (s) there is no room, the further off, in the end
     anywhere on the table."""
+    if name in now.truth.poses:
+        return None
     across = float(np.linalg.norm(now.scenario.table.size[:2]))
     within = min(BACK + SPREADS * max(0.0, now.t - since - WAITS), across)
     spot = now.spot(now.scenario.bodies[name], X_WO.rotation, X_WO.translation[:2], (0.0, within))
@@ -151,7 +153,7 @@ def new_one(now: Occasion, name: str) -> Deed | None:
 def path_blocked(now: Occasion, name: str) -> Deed | None:
     """The late body `name` is put where the running motion is going to come."""
     phase, controller = now.phase, now.machine.context.controller
-    if phase is None or phase.kind not in ("move", "approach", "slide"):
+    if name in now.truth.poses or phase is None or phase.kind not in ("move", "approach", "slide"):
         return None
     body, passed = now.scenario.bodies[name], controller.time_in_reference
     z = now.table_height() + depth_below(body.shape, np.eye(3)) + 5e-4
@@ -305,15 +307,17 @@ def goal_changed(now: Occasion) -> Deed | None:
     planned = {action.args[0]: action.args[1] for action in now.left if action.name == "place"}
     changeable = {}
     for fact in sorted(agenda.goal - facts):
+        if fact.predicate not in ("in_bin", "put_away"):
+            continue
         place = fact.args[1] if fact.predicate == "in_bin" else planned.get(fact.args[0], "")
-        if fact.predicate in ("in_bin", "put_away") and place in bins:
+        if place in bins:
             changeable[fact.args[0]] = place
     for name in _shuffled(now, list(changeable)):
         place = changeable[name]
         others = [other for other in bins if other != place and _takes_as_much(now.scenario.regions, other, place)]
         if others:
             other = others[int(now.rng.integers(len(others)))]
-            wanted = frozenset(fact for fact in agenda.goal if fact.args[:1] != (name,)) | {
+            wanted = frozenset(fact for fact in agenda.order if fact.args[:1] != (name,)) | {
                 Fact("in_bin", (name, other))
             }
             return Deed(f"{name} is wanted in {other} instead of {place}", goal=wanted, names=(name,))

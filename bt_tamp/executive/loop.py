@@ -31,7 +31,7 @@ from scenarios.scenario import Scenario
 from sim.disturbance import DisturbedPlant
 from sim.plant import Command
 
-STANDS = ("run_started", "plan_installed", "action_started", "action_done", "action_failed")
+STANDS = ("plan_installed", "action_started", "action_done", "action_failed")
 """Events at which it is written down how things stand: a run that is killed goes on from the last."""
 
 SAMPLE_EVERY = 5
@@ -127,11 +127,15 @@ def run_scenario(
     if driver is not None:
         driver.bind(machine)
     audits = Audits.of(machine)
+    # Until what was held is in the fingers again, things stand as they stood.
+    stood = start
     report("run_started", scene=scenario.name, seed=scenario.seed)
+    recorder.state(stood or state_of(machine))
     try:
         try:
             if start is not None:
                 take_up(machine, start)
+                stood = None
             ending = _run(machine, options, recorder, audits, tally)
         except KeyboardInterrupt:
             ending = Ending("interrupted", _brake(machine, recorder, audits, tally))
@@ -143,7 +147,7 @@ def run_scenario(
     if driver is not None:
         driver.close()
     report("run_ended", outcome=result.outcome, sentence=result.reason)
-    recorder.finish(result, state_of(machine))
+    recorder.finish(result, stood or state_of(machine))
     machine.plant.close()
     return result
 

@@ -7,11 +7,19 @@ import pytest
 from pinocchio import SE3
 
 from bt_tamp.disturb import driver
-from bt_tamp.disturb.classes import KINDS, Kind, Prospect
+from bt_tamp.disturb.classes import KINDS, Kind, Prospect, amended
 from bt_tamp.disturb.consequence import Trial
 from bt_tamp.disturb.deed import Deed, Later, Occasion
 from bt_tamp.disturb.driver import Driver
-from bt_tamp.disturb.world import brought_back, crumbs_beside_pan, goal_changed, knocked_from_hand, moved, rotated
+from bt_tamp.disturb.world import (
+    brought_back,
+    crumbs_beside_pan,
+    goal_changed,
+    knocked_from_hand,
+    moved,
+    path_blocked,
+    rotated,
+)
 from bt_tamp.executive.build import build
 from bt_tamp.options import RunOptions
 from planner.motion.motion_planner import MotionPlanner
@@ -215,6 +223,40 @@ def test_another_bin_is_wanted_for_what_belongs_in_one_or_goes_into_one(goal):
     assert deed.sentence == f"box is wanted in {other} instead of {planned}"
     assert deed.goal == {Fact("in_bin", ("box", other))}
     assert (before is None) == goal.startswith("(put_away")
+
+
+def test_a_goal_that_changes_keeps_what_is_still_to_come_and_what_is_about_nothing():
+    scenario = amended(load_scenario("fig1"), ("new-object",))
+    scenario = replace(scenario, goal=f"{scenario.goal[:-1]} (hand_empty))")
+    machine = build(scenario, RunOptions(), lambda kind, **data: None, lambda why: None)
+    machine.agenda.facts = lambda scene: frozenset()
+    now = Occasion(0.0, machine.plant.observe(), machine, MotionPlanner(machine.robot), np.random.default_rng(0))
+    outcome = machine.planner.plan(machine.context.scene, machine.agenda)
+    machine.agenda.adopt(outcome.plan, outcome.refinements, machine.context, "planned")
+    deed = goal_changed(now)
+    machine.plant.close()
+    assert deed is not None
+    assert {"hand_empty()", "stray_box"} <= {*map(str, deed.goal), *(arg for fact in deed.goal for arg in fact.args)}
+
+
+def test_what_stands_in_the_way_already_is_not_put_there_once_more():
+    scenario = amended(load_scenario("fig1"), ("path-blocked",))
+    (post,) = scenario.late
+    machine = build(scenario, RunOptions(), lambda kind, **data: None, lambda why: None)
+    outcome = machine.planner.plan(machine.context.scene, machine.agenda)
+    machine.agenda.adopt(outcome.plan, outcome.refinements, machine.context, "planned")
+    machine.agenda.begin()
+
+    def drawn(phase):
+        machine.context.phase = phase
+        now = Occasion(0.0, machine.plant.observe(), machine, MotionPlanner(machine.robot), np.random.default_rng(0))
+        return path_blocked(now, post), brought_back(now, post, SE3(np.eye(3), np.array([0.6, 0.0, 0.0])), 0.0)
+
+    phases = [phase for refinement in outcome.refinements for phase in refinement.phases]
+    phase, deeds = next((phase, deeds) for phase in phases if None not in (deeds := drawn(phase)))
+    machine.plant.bring(post, deeds[0].faults[0].X_WO)
+    assert drawn(phase) == (None, None)
+    machine.plant.close()
 
 
 def test_what_undoes_something_that_is_done_matters():

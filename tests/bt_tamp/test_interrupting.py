@@ -9,6 +9,7 @@ from bt_tamp.executive.seams import Seams
 from bt_tamp.options import RunOptions
 from bt_tamp.report.folder import RunFolder
 from bt_tamp.report.recorder import RunRecorder
+from bt_tamp.report.state import RunState
 from scenarios.load import load_scenario
 from sim.disturbance import DisturbedPlant
 
@@ -43,6 +44,37 @@ def test_an_error_while_the_arm_is_brought_to_rest_leaves_a_whole_folder(monkeyp
     assert json.loads((tmp_path / "run" / "result.json").read_text())["outcome"] == "crashed"
     assert (tmp_path / "run" / "state.json").exists()
     assert (tmp_path / "run" / "signals.npz").exists()
+
+
+def test_an_interruption_while_the_fingers_close_again_leaves_the_state_from_which_the_run_went_on(
+    monkeypatch, tmp_path
+):
+    def interrupt(number):
+        if number == 0:
+            raise KeyboardInterrupt
+
+    scenario = load_scenario("fig2")
+    with RunRecorder(scenario, RunFolder(tmp_path / "first")) as recorder:
+        loop.run_scenario(scenario, RunOptions(max_sim_time=3.6), recorder)
+    start = RunState.from_json((tmp_path / "first" / "state.json").read_text())
+    assert start.held == "sponge"
+    monkeypatch.setattr(loop, "REAL", Seams(plant=calling_at(0.05, interrupt)))
+    now = start.applied(scenario)
+    with RunRecorder(now, RunFolder(tmp_path / "second")) as recorder:
+        loop.run_scenario(now, RunOptions(), recorder, start)
+    assert RunState.from_json((tmp_path / "second" / "state.json").read_text()) == start
+
+
+def test_what_was_held_is_in_the_state_from_the_very_start(monkeypatch, tmp_path):
+    states = []
+    scenario = load_scenario("fig2")
+    start = RunState((0.0,) * 7, 0.05, "sponge", 20.0, {}, {}, "clear-table", ())
+    monkeypatch.setattr(
+        loop, "take_up", lambda machine, start: states.append((tmp_path / "run/state.json").read_text())
+    )
+    with RunRecorder(scenario, RunFolder(tmp_path / "run")) as recorder:
+        loop.run_scenario(scenario, RunOptions(max_sim_time=0.01), recorder, start)
+    assert RunState.from_json(states[0]) == start
 
 
 @pytest.mark.parametrize(("times", "said"), [(1, "the arm brought to rest"), (2, "twice, and ended at once")])

@@ -72,6 +72,7 @@ def test_what_is_taken_before_it_is_brought_back_is_there_at_the_start():
         ("{at: 1, take: {object: cap}}", "unknown object 'cap', did you mean 'cup'"),
         ("{at: 1, shift: {region: table, by: [0, 0, 0]}}", "unknown region 'table'"),
         ("{at: 1, push: {force: [1, 0, 0], seconds: 1, link: elbow}}", "unknown link 'elbow'"),
+        ("{at: 1, push: {force: [1, 0, 0], seconds: 1, link: link_0}}", "link 'link_0' doesn't move"),
         ("{at: 1, bring: {object: tin, pose: {on: shelf, xy: [0, 0]}}}", "unknown surface 'shelf'"),
         ('{at: 1, goal: "(in_bin cap crate)"}', "unknown object 'cap'"),
         ("{at: 1}", "0 things happen"),
