@@ -49,11 +49,11 @@ def plot(folder: Path, lines: Sequence[Line]) -> list[Path]:
     made = []
     for scene in dict.fromkeys(line.scene for line in lines):
         mine = [line for line in lines if line.scene == scene]
-        names = list(dict.fromkeys(line.disturb for line in mine))
+        names = list(dict.fromkeys(line.befell for line in mine))
         figure, (left, right) = plt.subplots(1, 2, figsize=(11, 1.5 + 0.28 * len(names)), sharey=True)
         for replan, colour, shift in ((True, "C0", 0.15), (False, "C3", -0.15)):
             for line in (line for line in mine if line.replan == replan):
-                y, rate = names.index(line.disturb) + shift, line.succeeded / max(line.runs, 1)
+                y, rate = names.index(line.befell) + shift, line.succeeded / max(line.runs, 1)
                 low, high = line.interval
                 left.plot([low, high], [y, y], color=colour, linewidth=1.5)
                 left.plot([rate], [y], "o", color=colour, markersize=4)

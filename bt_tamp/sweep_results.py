@@ -33,7 +33,8 @@ RIGHT_VERDICTS = ("proven_infeasible", "no_plan")
 class Run:
     """A stored run: `disturb` its classes ("none" for none), `replan` False for the open-loop baseline, `command` that
     replays it. `succeeded`: the goal was reached, or the right verdict given where it can't be: one that names the
-    body that was taken or thrown away."""
+    body that was taken or thrown away. choices: what else was chosen, as on the command line; digest: of the scene's
+    file, "" where that wasn't kept."""
 
     scene: str
     seed: int
@@ -43,7 +44,8 @@ class Run:
     reason: str
     result: RunResult | None
     command: str
-    options: str
+    choices: str = ""
+    digest: str = ""
 
     @property
     def is_reachable(self) -> bool:
@@ -52,14 +54,14 @@ class Run:
 
     @property
     def is_met(self) -> bool:
-        """Did what was to befall it befall it, and matter? A run that broke before it could tell counts as one."""
-        if self.disturb == UNDISTURBED or self.result is None or self.outcome in UNFINISHED:
+        """Did what was to befall it befall it, and matter? A run that failed counts as one, whatever made it fail."""
+        if self.disturb == UNDISTURBED or self.result is None or self.outcome != "goal_reached":
             return True
         return any(one.mattered for one in self.result.disturbances)
 
     @property
     def succeeded(self) -> bool:
-        if self.is_reachable or not self.is_met:
+        if self.is_reachable:
             return self.outcome == "goal_reached"
         return self.outcome in RIGHT_VERDICTS and any(map(self._names, self._lost))
 
@@ -77,8 +79,8 @@ class Run:
 
 @dataclass(frozen=True)
 class Line:
-    """The runs of one scene and class: `runs` and everything else are of those that were met, `unmet` counts the rest;
-    but no run may break a limit: peak_n and violations are of all.
+    """The runs of one scene, class and way, and of the same other choices (`variant`): `runs` and everything else are
+    of those that were met, `unmet` counts the rest; but no run may break a limit: peak_n and violations are of all.
 
     interval: 95 % of the success rate, by Wilson. lost_s: median of robot time beyond that of the undisturbed run of
     the same scene and seed, both having succeeded; lost_actions: the same as a multiple of the action that was undone.
@@ -89,6 +91,7 @@ class Line:
     scene: str
     disturb: str
     replan: bool
+    variant: str
     runs: int
     succeeded: int
     interval: tuple[float, float]
@@ -104,6 +107,11 @@ class Line:
     unmet: int
     reasons: tuple[tuple[str, int], ...]
 
+    @property
+    def befell(self) -> str:
+        """Class and variant."""
+        return ", ".join(part for part in (self.disturb, self.variant) if part)
+
 
 def runs_of(stored: Iterable[Stored]) -> list[Run]:
     """The stored runs."""
@@ -111,27 +119,33 @@ def runs_of(stored: Iterable[Stored]) -> list[Run]:
 
 
 def _run(row: Stored) -> Run:
-    options = dict(row.options)
-    disturb = ",".join(options.pop("disturb", ())) or UNDISTURBED
-    replan = bool(options.pop("replan", True))
+    disturb = ",".join(row.options.get("disturb", ())) or UNDISTURBED
     result = None if row.result is None else RunResult.from_json(row.result)
-    command = replay_command(row.scene, row.seed, row.options)
-    rest = repr(sorted(options.items(), key=str))
-    return Run(row.scene, row.seed, disturb, replan, row.outcome, row.reason, result, command, rest)
+    return Run(
+        *(row.scene, row.seed, disturb, bool(row.options.get("replan", True)), row.outcome, row.reason, result),
+        command=replay_command(row.scene, row.seed, row.options),
+        choices=shlex.join(_words(row.options, leaving=("disturb", "replan"))),
+        digest=str(row.options.get("digest", "")),
+    )
 
 
 def replay_command(scene: str, seed: int, options: Mapping[str, Any]) -> str:
     """The command line that runs the same once more."""
-    words = ["bt-tamp", "run", scene, "--seed", str(seed)]
-    for name, usual in _USUAL.items():
-        value = options.get(name, usual)
+    return shlex.join(["bt-tamp", "run", scene, "--seed", str(seed), *_words(options)])
+
+
+def _words(options: Mapping[str, Any], leaving: Iterable[str] = ()) -> list[str]:
+    """What was chosen, where that isn't the usual, as words of a command line."""
+    words: list[str] = []
+    for name in (name for name in _USUAL if name not in leaving):
+        value = options.get(name, _USUAL[name])
         if name == "disturb" and value:
             words += ["--disturb", ",".join(value)]
         elif name == "replan" and not value:
             words.append("--no-replan")
-        elif name not in ("disturb", "replan") and value != usual:
-            words += [f"--{name.replace('_', '-')}", f"{value:g}" if isinstance(value, float) else str(value)]
-    return shlex.join(words)
+        elif name not in ("disturb", "replan") and value != _USUAL[name]:
+            words += [f"--{name.replace('_', '-')}", str(value)]
+    return words
 
 
 _USUAL: dict[str, Any] = {
@@ -161,25 +175,35 @@ def wilson(succeeded: int, runs: int) -> tuple[float, float]:
 
 
 def lines(runs: Sequence[Run], together: bool = False) -> list[Line]:
-    """One line for each scene, class and way (watching or open loop), undisturbed runs first. together: all scenes'
-    runs of a class and way in one line."""
-    groups: dict[tuple[str, str, bool], list[Run]] = {}
+    """One line for each scene, class, way (watching or open loop) and variant, undisturbed runs first. together: all
+    scenes' runs of a class, way and variant in one line."""
+    files: dict[str, set[str]] = {}
     for run in runs:
-        groups.setdefault((TOGETHER if together else run.scene, run.disturb, run.replan), []).append(run)
+        files.setdefault(run.scene, set()).add(run.digest)
+    groups: dict[tuple[str, str, bool, str], list[Run]] = {}
+    for run in runs:
+        is_one_of_some = len(files[run.scene]) > 1 and not together
+        variant = " ".join([run.choices] * bool(run.choices) + [f"file {run.digest[:6] or '?'}"] * is_one_of_some)
+        groups.setdefault((TOGETHER if together else run.scene, run.disturb, run.replan, variant), []).append(run)
     order = {name: number for number, name in enumerate((UNDISTURBED, *CLASSES))}
-    keys = sorted(groups, key=lambda key: (key[0], order.get(key[1], len(order)), key[1], not key[2]))
-    usual = {(r.scene, r.seed, r.options, r.replan): r for r in runs if r.disturb == UNDISTURBED and r.succeeded}
+    keys = sorted(groups, key=lambda key: (key[0], key[3], order.get(key[1], len(order)), key[1], not key[2]))
+    usual = {_setting(run): run for run in runs if run.disturb == UNDISTURBED and run.succeeded}
     return [_line(key, groups[key], usual) for key in keys]
 
 
-def _line(key: tuple[str, str, bool], runs: Sequence[Run], usual: Mapping[tuple, Run]) -> Line:
+def _setting(run: Run) -> tuple[object, ...]:
+    """What a disturbed run shares with the undisturbed one beside it."""
+    return run.scene, run.seed, run.choices, run.digest, run.replan
+
+
+def _line(key: tuple[str, str, bool, str], runs: Sequence[Run], usual: Mapping[tuple, Run]) -> Line:
     met = [run for run in runs if run.is_met]
     results = [run.result for run in met if run.result is not None]
     every = [run.result for run in runs if run.result is not None]
     succeeded = sum(run.succeeded for run in met)
     lost, shares = [], []
     for run in met:
-        plain = usual.get((run.scene, run.seed, run.options, run.replan))
+        plain = usual.get(_setting(run))
         if run.succeeded and run.is_reachable and plain is not None and run.result and plain.result:
             lost.append(run.result.robot_s - plain.result.robot_s)
             undone = undone_s(run.result, plain.result)

@@ -3,12 +3,13 @@
 import json
 import sqlite3
 from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from bt_tamp.errors import UserError
+from bt_tamp.errors import UserError, refusing
 from bt_tamp.sweep import MAX_TRIES, Finished, Job
 
 UNFINISHED = ("crashed", "killed")
@@ -23,6 +24,8 @@ CREATE TABLE IF NOT EXISTS runs (
     PRIMARY KEY (scene, seed, options)
 )
 """
+
+_COLUMNS = frozenset("scene seed options outcome reason result tries".split())
 
 
 @dataclass(frozen=True)
@@ -50,17 +53,19 @@ class Stored(Row):
 
 
 class SweepStore:
-    """A context manager around the file. Raises UserError when it can't be used."""
+    """A context manager around the file, made if need be (is_made). Raises UserError when it can't be used."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, is_made: bool = True) -> None:
         self._path = path
         try:
             self._connection = sqlite3.connect(path, timeout=30.0)
+            columns = {row[1] for row in self._connection.execute("PRAGMA table_info(runs)")}
+            if not columns >= _COLUMNS and (columns or not is_made):
+                raise UserError(
+                    f"{path}: has no table `runs` like a sweep's, expected a store that `bt-tamp sweep` wrote"
+                )
             self._connection.execute("PRAGMA journal_mode=WAL")
             self._connection.execute(_TABLE)
-            columns = {row[1] for row in self._connection.execute("PRAGMA table_info(runs)")}
-            if "tries" not in columns:  # A store of before runs were tried again.
-                self._connection.execute("ALTER TABLE runs ADD COLUMN tries INTEGER NOT NULL DEFAULT 1")
             self._connection.commit()
         except sqlite3.Error as error:
             raise UserError(f"{path}: can't be used as a store of results ({error})") from None
@@ -78,7 +83,7 @@ class SweepStore:
         before = self.get(finished.job)
         tries = finished.tries + (before.tries if before is not None and before.outcome in UNFINISHED else 0)
         row = (*_key(finished.job), finished.outcome, finished.reason, finished.result, tries)
-        with self._connection:
+        with self._refusing(), self._connection:
             self._connection.execute(
                 "INSERT OR REPLACE INTO runs (scene, seed, options, outcome, reason, result, tries)"
                 " VALUES (?, ?, ?, ?, ?, ?, ?)",
@@ -87,16 +92,19 @@ class SweepStore:
 
     def get(self, job: Job) -> Row | None:
         """What is stored of a job."""
-        found = self._connection.execute(
-            "SELECT outcome, reason, result, tries FROM runs WHERE scene = ? AND seed = ? AND options = ?", _key(job)
-        ).fetchone()
+        with self._refusing():
+            found = self._connection.execute(
+                "SELECT outcome, reason, result, tries FROM runs WHERE scene = ? AND seed = ? AND options = ?",
+                _key(job),
+            ).fetchone()
         return None if found is None else Row(*found)
 
     def everything(self) -> list[Stored]:
         """All that is stored, by scene and seed."""
-        found = self._connection.execute(
-            "SELECT outcome, reason, result, tries, scene, seed, options FROM runs ORDER BY scene, options, seed"
-        ).fetchall()
+        with self._refusing():
+            found = self._connection.execute(
+                "SELECT outcome, reason, result, tries, scene, seed, options FROM runs ORDER BY scene, options, seed"
+            ).fetchall()
         return [
             Stored(outcome, reason, result, tries, scene, seed, json.loads(options))
             for outcome, reason, result, tries, scene, seed, options in found
@@ -106,6 +114,10 @@ class SweepStore:
         """Those of the jobs that are stored."""
         found = {job: self.get(job) for job in jobs}
         return {job: row for job, row in found.items() if row is not None}
+
+    def _refusing(self) -> AbstractContextManager[None]:
+        """A file that can't be read or written any more (locked, the disk full) is the person's to mend."""
+        return refusing(sqlite3.Error, about=str(self._path))
 
 
 def _key(job: Job) -> tuple[str, int, str]:

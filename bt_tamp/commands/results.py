@@ -34,11 +34,11 @@ def call(arguments: argparse.Namespace) -> int:
 
     if not arguments.store.is_file():
         raise UserError(f"{arguments.store}: no such file, expected a store that `bt-tamp sweep` wrote")
-    with SweepStore(arguments.store) as store, refusing(ValueError, about=str(arguments.store)):
+    with SweepStore(arguments.store, is_made=False) as store, refusing(ValueError, about=str(arguments.store)):
         runs = runs_of(store.everything())
+        found = lines(runs, arguments.together)
     if not runs:
         raise UserError(f"{arguments.store}: holds no runs")
-    found = lines(runs, arguments.together)
     _print(found, runs)
     if arguments.out is not None:
         _export(arguments.out, found, runs)
@@ -64,7 +64,7 @@ def _print(found: "list[Line]", runs: "list[Run]") -> None:
         low, high = line.interval
         table.add_row(
             scene_name(line.scene),
-            line.disturb + ("" if line.replan else ", open loop"),
+            line.befell + ("" if line.replan else ", open loop"),
             f"{line.succeeded}/{line.runs}",
             f"{100 * low:.0f}–{100 * high:.0f}" if line.runs else "–",
             *(_shown(value) for value in (line.replans, line.lost_s, line.lost_actions)),

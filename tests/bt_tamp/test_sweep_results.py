@@ -2,6 +2,7 @@
 
 import csv
 import os
+import sqlite3
 from dataclasses import replace
 from pathlib import Path
 
@@ -92,6 +93,29 @@ def test_a_run_that_nothing_befell_that_matters_is_neither_success_nor_failure(s
     assert (line.runs, line.succeeded, line.unmet) == (5, 3, 1)
 
 
+def test_a_run_that_failed_counts_whatever_made_it_fail(store):
+    with SweepStore(store) as opened:
+        opened.add(finished(7, 9.0, ("push",), "gave_up", "25 plans were made", mattered=False))
+        opened.add(finished(7, 9.0, ("taken-for-good",), "gave_up", "25 plans were made", mattered=False))
+    found = [table(store)[name, True] for name in ("push", "taken-for-good")]
+    assert [(line.succeeded, line.runs) for line in found] == [(0, 1), (1, 3)]
+
+
+def test_runs_with_other_choices_or_of_another_file_are_told_apart(store, capsys):
+    with SweepStore(store) as opened:
+        opened.add(finished(0, 24.0, ("moved",), contact="impedance"))
+        for digest in ("abcdef01", "12345678"):
+            opened.add(replace(elsewhere := finished(0, 24.0, ("moved",)), job=replace(elsewhere.job, digest=digest)))
+    assert main(["results", str(store)]) == 0
+    said = capsys.readouterr().out
+    for variant in ("file ?", "--contact impedance file ?", "file abcdef", "file 123456"):
+        assert f"moved, {variant} " in said
+    assert main(["results", str(store), "--together"]) == 0
+    said = capsys.readouterr().out
+    assert "file" not in said
+    assert "moved, --contact impedance" in said
+
+
 def test_a_run_that_crashed_before_anything_befell_it_is_a_failure(store):
     with SweepStore(store) as opened:
         opened.add(finished(3, 2.0, (), "crashed", "KeyError"))
@@ -173,6 +197,24 @@ def test_a_store_that_is_not_there_is_refused(tmp_path, capsys):
     assert main(["results", str(tmp_path / "no.db")]) == 2
     assert "no such file" in capsys.readouterr().err
     assert not (tmp_path / "no.db").exists()
+
+
+@pytest.mark.parametrize("columns", ["id INTEGER, name TEXT", None])
+def test_another_programs_file_is_refused_and_left_as_it_was(columns, tmp_path, capsys):
+    path = tmp_path / "other.db"
+    with sqlite3.connect(path) as connection:
+        connection.execute(f"CREATE TABLE {'runs' if columns else 'other'} ({columns or 'x'})")
+    before = path.read_bytes()
+    assert main(["results", str(path)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert path.read_bytes() == before
+
+
+def test_a_class_that_is_no_longer_known_is_told_in_one_line(store, capsys):
+    with SweepStore(store) as opened:
+        opened.add(finished(0, 24.0, ("earthquake",)))
+    assert main(["results", str(store)]) == 2
+    assert "unknown class of disturbance 'earthquake'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", ["run", "sweep"])
