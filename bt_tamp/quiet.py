@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TextIO
 
 
 @contextmanager
@@ -27,12 +28,14 @@ def quiet_imports() -> Iterator[None]:
 
 
 @contextmanager
-def outliving_a_closed_pipe() -> Iterator[None]:
-    """Inside the block stdout may turn out to be a closed pipe (`| head`): from then on it leads nowhere."""
+def outliving_a_closed_pipe(stream: TextIO | None = None) -> Iterator[None]:
+    """Inside the block a stream (None: stdout) may turn out to be a closed pipe (`| head`): from then on it leads
+    nowhere."""
+    stream = sys.stdout if stream is None else stream
     try:
         yield
-        sys.stdout.flush()
+        stream.flush()
     except BrokenPipeError:
         nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
+        os.dup2(nowhere, stream.fileno())
         os.close(nowhere)

@@ -93,7 +93,12 @@ def run_jobs(
             while idle and (job := again.pop() if again else next(waiting, None)) is not None:
                 executor = idle.pop()
                 tries[job] += 1
-                running[executor.submit(work, job)] = _Running(job, executor, time.monotonic() + allowed(job))
+                try:
+                    future = executor.submit(work, job)
+                except BrokenProcessPool:  # Its process vanished while it was idle.
+                    executor = _executor()
+                    future = executor.submit(work, job)
+                running[future] = _Running(job, executor, time.monotonic() + allowed(job))
             if not running:
                 return
             left = max(0.0, min(one.until for one in running.values()) - time.monotonic())

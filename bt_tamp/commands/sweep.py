@@ -107,6 +107,7 @@ def _run(jobs: "list[Job]", processes: int, store: "SweepStore") -> None:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+    from bt_tamp.quiet import outliving_a_closed_pipe
     from bt_tamp.sweep import run_jobs
 
     console = Console(stderr=True)
@@ -123,7 +124,8 @@ def _run(jobs: "list[Job]", processes: int, store: "SweepStore") -> None:
             bar.advance(task)
             reached += finished.outcome == "goal_reached"
             said = f"{number}/{len(jobs)} ({reached} reached) {_said(finished)}"
-            print(said, file=sys.stderr) if is_silent else bar.console.print(said, highlight=False, markup=False)
+            with outliving_a_closed_pipe(sys.stderr):
+                print(said, file=sys.stderr) if is_silent else bar.console.print(said, highlight=False, markup=False)
 
 
 def _said(finished: "Finished") -> str:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from threading import Timer
 
 import pytest
 from rich.console import Console
@@ -46,6 +47,31 @@ def test_a_process_that_vanishes_and_one_that_fails_cost_no_other_run() -> None:
     outcomes = {done.job.options.seed: done.outcome for done in run_jobs(map(job, range(5)), 2, work)}
 
     assert outcomes == {0: "goal_reached", 1: "killed", 2: "crashed", 3: "goal_reached", 4: "goal_reached"}
+
+
+def test_a_process_that_vanishes_between_two_runs_costs_neither() -> None:
+    def work(given: Job) -> Finished:
+        Timer(0.3, os._exit, (9,)).start()
+        return Finished(given, "goal_reached", "")
+
+    outcomes = []
+    for done in run_jobs(map(job, range(2)), 1, work):
+        outcomes.append(done.outcome)
+        time.sleep(1.5)
+
+    assert outcomes == ["goal_reached", "goal_reached"]
+
+
+def test_a_sweep_whose_progress_nobody_reads_any_more_comes_to_its_end(tmp_path: Path) -> None:
+    store = tmp_path / "s.db"
+    command = [sys.executable, "-m", "bt_tamp", "sweep", "fig2", "--seeds", "0:2", "--max-sim-time", "0.1"]
+    command += ["--jobs", "1", "--store", str(store)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as sweep:
+        assert sweep.stderr is not None
+        sweep.stderr.close()
+        assert sweep.wait() == 0
+    with SweepStore(store) as opened:
+        assert len(opened.everything()) == 2
 
 
 def test_a_run_that_hangs_in_native_code_is_ended_recorded_and_costs_no_other() -> None:
