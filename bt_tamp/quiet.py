@@ -31,11 +31,11 @@ def quiet_imports() -> Iterator[None]:
 def outliving_a_closed_pipe(stream: TextIO | None = None) -> Iterator[None]:
     """Inside the block a stream (None: stdout) may turn out to be a closed pipe (`| head`): from then on it leads
     nowhere."""
-    stream = sys.stdout if stream is None else stream
+    into = stream or sys.stdout
     try:
         yield
-        stream.flush()
+        into.flush()
     except BrokenPipeError:
         nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, stream.fileno())
+        os.dup2(nowhere, into.fileno())
         os.close(nowhere)

@@ -61,7 +61,7 @@ class Run:
 
     @property
     def succeeded(self) -> bool:
-        if self.is_reachable:
+        if self.is_reachable or not self.is_met:
             return self.outcome == "goal_reached"
         return self.outcome in RIGHT_VERDICTS and any(map(self._names, self._lost))
 
