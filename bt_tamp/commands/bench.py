@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bt_tamp.commands.stopping import stop_on_signals
+from bt_tamp.stopping import stop_on_signals
 
 if TYPE_CHECKING:
     from collections.abc import Callable

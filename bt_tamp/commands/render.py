@@ -12,8 +12,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def call(arguments: argparse.Namespace) -> int:
     """Render, and print where the video lies."""
-    from bt_tamp.commands.stopping import stop_on_signals
     from bt_tamp.report.folder import existing_run
+    from bt_tamp.stopping import stop_on_signals
 
     stop_on_signals()
     print(render(existing_run(arguments.folder), arguments.out))

@@ -14,7 +14,7 @@ from bt_tamp.commands.choices import (
     options_of,
     startable_scenario_of,
 )
-from bt_tamp.commands.stopping import stop_on_signals
+from bt_tamp.stopping import stop_on_signals
 
 if TYPE_CHECKING:
     from bt_tamp.report.result import RunResult

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_tamp.commands.choices import add_disturbances, add_planning, add_time_limit, check_start, options_of
-from bt_tamp.commands.stopping import stop_on_signals
+from bt_tamp.stopping import stop_on_signals
 
 if TYPE_CHECKING:
     from bt_tamp.sweep import Finished, Job

@@ -26,6 +26,7 @@ from bt_tamp.report.result import Outcome, RunResult
 from bt_tamp.report.sentences import counted
 from bt_tamp.report.signals import Contact, Reference
 from bt_tamp.report.state import RunState
+from bt_tamp.stopping import uninterrupted
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
 from sim.disturbance import DisturbedPlant
@@ -142,13 +143,14 @@ def run_scenario(
     except Exception as error:  # Whatever it is: the run's folder is worth most when something went wrong.
         ending = Ending("crashed", f"{type(error).__name__}: {one_line_of(error)}")
         recorder.crash(traceback.format_exc())
-    result = _result(machine, scenario, ending, audits, tally)
-    recorder.tree(machine.mission.root, "end", tally.results)
-    if driver is not None:
-        driver.close()
-    report("run_ended", outcome=result.outcome, sentence=result.reason)
-    recorder.finish(result, stood or state_of(machine))
-    machine.plant.close()
+    with uninterrupted():
+        result = _result(machine, scenario, ending, audits, tally)
+        recorder.tree(machine.mission.root, "end", tally.results)
+        if driver is not None:
+            driver.close()
+        report("run_ended", outcome=result.outcome, sentence=result.reason)
+        recorder.finish(result, stood or state_of(machine))
+        machine.plant.close()
     return result
 
 

@@ -1,6 +1,8 @@
 """A run that is interrupted, and what goes wrong then."""
 
 import json
+import os
+import signal
 
 import pytest
 
@@ -9,6 +11,7 @@ from bt_tamp.executive.seams import Seams
 from bt_tamp.options import RunOptions
 from bt_tamp.report.folder import RunFolder
 from bt_tamp.report.recorder import RunRecorder
+from bt_tamp.report.result import RunResult
 from bt_tamp.report.state import RunState
 from scenarios.load import load_scenario
 from sim.disturbance import DisturbedPlant
@@ -44,6 +47,22 @@ def test_an_error_while_the_arm_is_brought_to_rest_leaves_a_whole_folder(monkeyp
     assert json.loads((tmp_path / "run" / "result.json").read_text())["outcome"] == "crashed"
     assert (tmp_path / "run" / "state.json").exists()
     assert (tmp_path / "run" / "signals.npz").exists()
+
+
+class ImpatientRecorder(RunRecorder):
+    """Somebody presses Ctrl-C just when the folder is written."""
+
+    def finish(self, result, state):
+        os.kill(os.getpid(), signal.SIGINT)
+        super().finish(result, state)
+
+
+def test_an_interruption_while_the_folder_is_written_leaves_it_whole(tmp_path):
+    scenario = load_scenario("fig2")
+    with ImpatientRecorder(scenario, RunFolder(tmp_path / "run")) as recorder:
+        result = loop.run_scenario(scenario, RunOptions(max_sim_time=0.1), recorder)
+    assert RunResult.from_json((tmp_path / "run" / "result.json").read_text()) == result
+    assert (tmp_path / "run" / "state.json").exists()
 
 
 def test_an_interruption_while_the_fingers_close_again_leaves_the_state_from_which_the_run_went_on(
