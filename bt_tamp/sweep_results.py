@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 from bt_tamp.disturb.names import CLASSES, can_be_reached, chosen
+from bt_tamp.replay import replay_command, words
 from bt_tamp.report.result import RunResult
 from bt_tamp.sweep_store import UNFINISHED, Stored
 
@@ -124,42 +124,9 @@ def _run(row: Stored) -> Run:
     return Run(
         *(row.scene, row.seed, disturb, bool(row.options.get("replan", True)), row.outcome, row.reason, result),
         command=replay_command(row.scene, row.seed, row.options),
-        choices=shlex.join(_words(row.options, leaving=("disturb", "replan"))),
+        choices=shlex.join(words(row.options, leaving=("disturb", "replan"))),
         digest=str(row.options.get("digest", "")),
     )
-
-
-def replay_command(scene: str, seed: int, options: Mapping[str, Any]) -> str:
-    """The command line that runs the same once more."""
-    return shlex.join(["bt-tamp", "run", scene, "--seed", str(seed), *_words(options)])
-
-
-def _words(options: Mapping[str, Any], leaving: Iterable[str] = ()) -> list[str]:
-    """What was chosen, where that isn't the usual, as words of a command line."""
-    words: list[str] = []
-    for name in (name for name in _USUAL if name not in leaving):
-        value = options.get(name, _USUAL[name])
-        if name == "disturb" and value:
-            words += ["--disturb", ",".join(value)]
-        elif name == "replan" and not value:
-            words.append("--no-replan")
-        elif name not in ("disturb", "replan") and value != _USUAL[name]:
-            words += [f"--{name.replace('_', '-')}", str(value)]
-    return words
-
-
-_USUAL: dict[str, Any] = {
-    "disturb": (),
-    "replan": True,
-    "contact": "hybrid",
-    "preset": "default",
-    "search": None,
-    "tries": None,
-    "motion_planner": None,
-    "domain": None,
-    "problem": None,
-    "max_sim_time": 900.0,
-}
 
 
 def wilson(succeeded: int, runs: int) -> tuple[float, float]:

@@ -24,8 +24,7 @@ class Blocked:
 class Failure:
     """An action that can't be refined, or failed while running.
 
-    `reason` is one sentence for people. `depends_on` names bodies at whose present pose the
-    failure holds (the object itself: no grasp while it lies so; the culprits of each sample).
+    `reason` is one sentence for people.
     """
 
     action: GroundAction

@@ -1,8 +1,9 @@
 """The options that every command that plans or runs understands, and `RunOptions` from them."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bt_tamp.options import RunOptions
@@ -17,20 +18,14 @@ def add_scene(parser: argparse.ArgumentParser, is_optional: bool = False) -> Non
         nargs="?" if is_optional else None,
         help="a shipped scene's name (bt-tamp list) or a scene file",
     )
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="0 (default): the nominal scene; else noise drawn from N"
-    )
+    parser.add_argument("--seed", type=int, metavar="N", help="0 (default): the nominal scene; else noise drawn from N")
 
 
 def add_planning(parser: argparse.ArgumentParser) -> None:
     """How to plan and to touch."""
     group = parser.add_argument_group("planning and contact")
-    group.add_argument(
-        "--contact", choices=("hybrid", "impedance"), default="hybrid", help="control of contact (default: hybrid)"
-    )
-    group.add_argument(
-        "--preset", choices=("default", "paper"), default="default", help="paper: the paper's values where it gives any"
-    )
+    group.add_argument("--contact", choices=("hybrid", "impedance"), help="control of contact (default: hybrid)")
+    group.add_argument("--preset", choices=("default", "paper"), help="paper: the paper's values where it gives any")
     group.add_argument(
         "--search",
         metavar="NAME",
@@ -58,7 +53,8 @@ def add_disturbances(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--no-replan",
         dest="replan",
-        action="store_false",
+        action="store_const",
+        const=False,
         help="the open-loop baseline: the first plan is carried out blindly, and a failure ends the run",
     )
 
@@ -70,13 +66,16 @@ def add_time_limit(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def options_of(arguments: argparse.Namespace, window: bool = False) -> "RunOptions":
-    """The choices made on the command line. Raises UserError for values that can't be."""
+def options_of(
+    arguments: argparse.Namespace, window: bool = False, before: Mapping[str, Any] | None = None
+) -> "RunOptions":
+    """The choices made on the command line, over those made `before`. Raises UserError for values that can't be."""
     from bt_tamp.errors import refusing
     from bt_tamp.options import RunOptions
 
     names = "seed contact preset search tries motion_planner domain problem replan max_sim_time".split()
-    given = {name: getattr(arguments, name) for name in names if hasattr(arguments, name)}
+    given = dict(before or {})
+    given |= {name: value for name in names if (value := getattr(arguments, name, None)) is not None}
     if hasattr(arguments, "disturb"):
         from bt_tamp.disturb.names import chosen
 
@@ -94,7 +93,7 @@ def scenario_of(arguments: argparse.Namespace) -> "Scenario":
     from scenarios.load import load_scenario
 
     with refusing(ValueError):
-        return load_scenario(arguments.scene, arguments.seed)
+        return load_scenario(arguments.scene, arguments.seed or 0)
 
 
 def startable_scenario_of(arguments: argparse.Namespace) -> "Scenario":

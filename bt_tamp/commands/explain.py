@@ -24,5 +24,7 @@ def call(arguments: argparse.Namespace) -> int:
     if (folder / RESULT).exists():
         with refusing(ValueError, OSError, about=str(folder / RESULT)):
             result = RunResult.from_json((folder / RESULT).read_text(encoding="utf-8"))
-    print(story(events, result))
+    with refusing(ValueError, about=str(folder / EVENTS)):
+        told = story(events, result)
+    print(told)
     return 0

@@ -4,7 +4,7 @@ import argparse
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bt_tamp.commands.choices import (
     add_disturbances,
@@ -42,8 +42,10 @@ def call(arguments: argparse.Namespace) -> int:
     """Run, then say where everything lies; the exit code tells the outcome."""
     from bt_tamp.display import has_display
 
-    options = options_of(arguments, window=arguments.render and has_display())
+    options_of(arguments)  # What is wrong there is told before anything is read.
     scenario, start = _beginning(arguments)
+    before = {} if arguments.resume is None else _choices_before(arguments.resume)
+    options = options_of(arguments, window=arguments.render and has_display(), before=before)
     options = replace(options, seed=scenario.seed)
 
     from bt_tamp.report.folder import RunFolder
@@ -57,6 +59,7 @@ def call(arguments: argparse.Namespace) -> int:
         from bt_tamp.disturb.classes import amended
         from bt_tamp.executive.loop import run_scenario
     from bt_tamp.garbage import collect_rarely
+    from bt_tamp.replay import choices_of, replay_command
     from bt_tamp.report.live import watcher
     from bt_tamp.report.recorder import RunRecorder
 
@@ -70,6 +73,8 @@ def call(arguments: argparse.Namespace) -> int:
         video = _render(folder.path)
     with outliving_a_closed_pipe():
         print(_closing(result))
+        if arguments.resume is None and result.outcome not in ("goal_reached", "interrupted"):
+            print(f"Again: {replay_command(arguments.scene, scenario.seed, choices_of(options))}")
         print(folder.path if video is None else video)
     return result.exit_code
 
@@ -80,6 +85,8 @@ def _beginning(arguments: argparse.Namespace) -> "tuple[Scenario, RunState | Non
 
     if (arguments.scene is None) == (arguments.resume is None):
         raise UserError("expected either a SCENE or --resume DIR")
+    if arguments.resume is not None and arguments.seed is not None:
+        raise UserError(f"--seed {arguments.seed}: can't go with --resume, the run that goes on has its seed")
     if arguments.resume is None:
         return startable_scenario_of(arguments), None
 
@@ -92,6 +99,19 @@ def _beginning(arguments: argparse.Namespace) -> "tuple[Scenario, RunState | Non
         scenario = scenario_from_json((folder / SCENARIO).read_text(encoding="utf-8"))
         start = RunState.from_json((folder / STATE).read_text(encoding="utf-8"))
         return start.applied(scenario), start
+
+
+def _choices_before(folder: Path) -> dict[str, Any]:
+    """What was chosen for the run in a folder, but for what befell it. Raises UserError."""
+    from bt_tamp.errors import refusing
+    from bt_tamp.replay import choices_from
+    from bt_tamp.report.events import read_events
+    from bt_tamp.report.folder import EVENTS
+
+    with refusing(ValueError, OSError):
+        begun = next((event for event in read_events(folder / EVENTS) if event.kind == "run_started"), None)
+        chosen = choices_from(begun.data.get("choices", {}) if begun is not None else {})
+    return {name: value for name, value in chosen.items() if name not in ("disturb", "max_sim_time")}
 
 
 def _render(folder: Path) -> Path | None:
@@ -131,4 +151,6 @@ def _where(place: str, are_many: bool) -> str:
         return "still in the hand"
     if place == "nowhere":
         return f"{'are' if are_many else 'is'} nowhere to be seen"
+    if place == "elsewhere":
+        return f"{'lie' if are_many else 'lies'} elsewhere"
     return f"{'lie' if are_many else 'lies'} {'on the' if place in ('table', 'floor') else 'in'} {place}"

@@ -150,10 +150,18 @@ class Agenda:
             return missing.reason
         if k is None:
             return "what is left of the plan no longer leads to the goal"
-        if k != self._running:
-            self._build_from(k, context, "skipped" if k > self._running else "redone")
+        if k > self._running:
+            self._tell(context, "skipped", plan.actions[self._running : k])
+            self._build_from(k, context, "skipped")
+        elif k < self._running:
+            lacking = sorted(plan.steps[k].adds - facts)
+            self._tell(context, "redone", plan.actions[k : self._running], lacking=[str(fact) for fact in lacking])
+            self._build_from(k, context, "redone")
         self._sound = self._running, True, facts
         return None
+
+    def _tell(self, context: SkillContext, kind: str, actions: tuple[GroundAction, ...], **more: list[str]) -> None:
+        context.report(kind, actions=[str(action) for action in actions], **more)
 
     def _missing_effect(self, plan: TaskPlan, k: int | None, facts: frozenset[Fact]) -> EffectMissing | None:
         """That what was just done doesn't have the effect that the plan rests on, again. k: where the plan would go

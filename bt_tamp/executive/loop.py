@@ -21,6 +21,7 @@ from bt_tamp.executive.resuming import entering, state_of, take_up
 from bt_tamp.executive.seams import REAL
 from bt_tamp.export.snapshot import Results
 from bt_tamp.options import RunOptions
+from bt_tamp.replay import choices_of
 from bt_tamp.report.recorder import RunRecorder
 from bt_tamp.report.result import Outcome, RunResult
 from bt_tamp.report.sentences import counted
@@ -31,6 +32,7 @@ from planner.task.facts import place_of
 from scenarios.scenario import Scenario
 from sim.disturbance import DisturbedPlant
 from sim.plant import Command
+from sim.scene import SceneState, depth_below, floor_height
 
 STANDS = ("plan_installed", "action_started", "action_done", "action_failed")
 """Events at which it is written down how things stand: a run that is killed goes on from the last."""
@@ -49,6 +51,9 @@ BLIND_PATIENCE = 3.0
 
 REST_PATIENCE = 30.0
 """Simulated seconds that things may go on moving once the goal's literals hold."""
+
+ON_FLOOR = 0.01
+"""Metres above the floor up to which what lies nowhere else is on it."""
 
 MAX_REPLANS = 25
 MAX_ACTIONS = 200
@@ -130,7 +135,8 @@ def run_scenario(
     audits = Audits.of(machine)
     # Until what was held is in the fingers again, things stand as they stood.
     stood = start
-    report("run_started", scene=scenario.name, seed=scenario.seed)
+    begun = {"scene": scenario.name, "seed": scenario.seed, "choices": choices_of(options)}
+    report("run_started", **begun, resumed=start is not None)
     recorder.state(stood or state_of(machine))
     try:
         try:
@@ -177,10 +183,15 @@ def _brake(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tally
     try:
         machine.agenda.act.stop(Status.INVALID)
         machine.context.controller.hold()
+        machine.context.controller.acknowledge()
         for n in range(round(BRAKING / (CONTROL_EVERY * machine.plant.timestep))):
             machine.context.observation = machine.plant.observe()
             tally.t = machine.context.observation.t
             act(machine, recorder, audits, tally, n)
+            if n % TREE_EVERY == 0:
+                machine.context.scene = machine.belief.update(
+                    machine.context.observation, machine.context.grip.is_closing
+                )
             if machine.context.controller.finished:
                 return "the run was interrupted, the arm brought to rest"
     except KeyboardInterrupt:
@@ -269,7 +280,7 @@ def _ending(machine: Machine, options: RunOptions, tally: Tally) -> Ending | Non
     if restless is not None and machine.context.observation.t - restless[0] > REST_PATIENCE:
         return Ending("gave_up", f"{', '.join(restless[1])} did not come to rest within {REST_PATIENCE:g} s")
     if machine.planner.thinking.plans > MAX_REPLANS:
-        return Ending("gave_up", f"{MAX_REPLANS} plans were made and none led to the goal{_most_often(tally)}")
+        return Ending("gave_up", f"planning {MAX_REPLANS} times did not lead to the goal{_most_often(tally)}")
     if len(machine.agenda.executed) > MAX_ACTIONS:
         return Ending("gave_up", f"{MAX_ACTIONS} actions were carried out and the goal still does not hold")
     if machine.context.observation.t > options.max_sim_time:
@@ -302,10 +313,7 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audits: Audits
     context, agenda, thinking = machine.context, machine.agenda, machine.planner.thinking
     known = agenda.facts(context.scene)
     held = context.scene.held
-    places = {
-        name: (place_of(context.scene, name) or "floor") if name in context.scene.poses else "nowhere"
-        for name in scenario.bodies
-    }
+    places = {name: _place(context.scene, name) for name in scenario.bodies}
     if held is not None:
         places[held.name] = "hand"
     return RunResult(
@@ -335,6 +343,16 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audits: Audits
         energy_j=tally.energy_j,
         disturbances=tally.befallen.found,
     )
+
+
+def _place(scene: SceneState, name: str) -> str:
+    """Where a body lies that isn't in the hand, in a word."""
+    if name not in scene.poses:
+        return "nowhere"
+    X_WO = scene.poses[name]
+    lowest = float(X_WO.translation[2]) - depth_below(scene.scenario.bodies[name].shape, X_WO.rotation)
+    is_on_floor = lowest < floor_height(scene.scenario) + ON_FLOOR
+    return place_of(scene, name) or ("floor" if is_on_floor else "elsewhere")
 
 
 def _report(recorder: RunRecorder, t: float, kind: str, data: dict[str, Any], earlier_rounds: int) -> None:

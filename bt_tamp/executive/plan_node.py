@@ -95,23 +95,27 @@ class PlanNode(Behaviour):
         self._ready_at = 0.0
         self._why = "planned"
         self._waits_for: tuple[str, ...] = ()
+        self._told_missing: tuple[str, ...] = ()
         self._scene = context.scene
         self._pursued: frozenset[Fact] = frozenset()
         self._put_off: set[frozenset[Fact]] = set()
 
     def initialise(self) -> None:
         self._outcome = None
-        self._waits_for = ()
+        self._waits_for = self._told_missing = ()
         self._put_off = set()
         self._since = self._settling_since = self._context.observation.t
 
     def update(self) -> Status:
         context, thinking = self._context, self._planner.thinking
         if self._waits_for:
-            if self._agenda.missing(context.scene) == self._waits_for and not self._is_out_of_patience():
+            missing = self._agenda.missing(context.scene)
+            is_as_before = missing == self._waits_for and not self._has_changed(context.scene)
+            if is_as_before and not self._is_out_of_patience():
                 return Status.RUNNING
-            if self._agenda.missing(context.scene) != self._waits_for:
+            if not is_as_before:
                 self._outcome, self._waits_for = None, ()
+                self._settling_since = context.observation.t
         if self._outcome is None:
             observation = context.observation
             if moving(observation) and observation.t - self._settling_since < PATIENCE:
@@ -130,7 +134,9 @@ class PlanNode(Behaviour):
             missing = self._agenda.missing(context.scene)
             if missing and not self._is_out_of_patience():
                 self._waits_for = missing
-                context.report("missing", bodies=list(missing))
+                if missing != self._told_missing:
+                    self._told_missing = missing
+                    context.report("missing", bodies=list(missing))
                 return Status.RUNNING
             if self._does_the_rest_first(self._outcome):
                 self._outcome = None

@@ -31,7 +31,7 @@ class Event:
     def from_line(line: str) -> "Event":
         """Read one line. Raises ValueError when it isn't an event."""
         record = json.loads(line)
-        if not isinstance(record, dict) or "kind" not in record or "t" not in record:
+        if not isinstance(record, dict) or "kind" not in record or not isinstance(record.get("t"), (int, float)):
             raise ValueError(f"not an event: {line.strip()[:80]!r}")
         return Event(str(record.pop("kind")), float(record.pop("t")), record)
 

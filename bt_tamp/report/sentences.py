@@ -29,6 +29,10 @@ def sentence(event: Event) -> str | None:
             return f"{data['action']} failed: {data['reason']}"
         case "refined_again":
             return f"{data['action']} is worked out anew: {data['reason']}"
+        case "skipped":
+            return f"skipped, as it is done already: {', '.join(data['actions'])}"
+        case "redone":
+            return f"{', '.join(data['actions'])} again: {', '.join(data['lacking']) or 'its effect'} no longer holds"
         case "pressed_harder":
             return f"{data['action']} slips: pressed with {data['force']:.0f} N from now on"
         case "put_off":

@@ -4,6 +4,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from bt_tamp.replay import words
 from bt_tamp.report.events import Event
 from bt_tamp.report.result import RunResult
 from bt_tamp.report.sentences import counted, in_the_way, planner_failed
@@ -12,7 +13,10 @@ WIDTH = 100
 
 
 def story(events: Iterable[Event], result: RunResult | None) -> str:
-    """The whole story, lines of at most `WIDTH` characters. Without a result it says that the run was cut off."""
+    """The whole story, lines of at most `WIDTH` characters. Without a result it says that the run was cut off.
+
+    Raises ValueError for an event that lacks what its kind has.
+    """
     teller = _Teller()
     for event in events:
         teller.hear(event)
@@ -34,18 +38,24 @@ class _Teller:
 
     def hear(self, event: Event) -> None:
         tell = getattr(self, f"_{event.kind}", None)
-        if tell is not None:
-            tell(event, event.data)
+        try:
+            if tell is not None:
+                tell(event, event.data)
+        except KeyError as key:
+            raise ValueError(f"event {event.kind!r} at {event.t:g} s: lacks {key}") from None
 
     def _run_started(self, event: Event, data: Any) -> None:
         noise = "the nominal scene" if data["seed"] == 0 else "with that seed's noise"
-        self._heading(f"{data['scene']}, seed {data['seed']} ({noise})")
+        if data.get("resumed"):
+            noise = "gone on from where another run ended"
+        told = "".join(f", {word}" for word in [" ".join(words(data.get("choices", {})))] if word)
+        self._heading(f"{data['scene']}, seed {data['seed']} ({noise}){told}")
 
     def _round(self, event: Event, data: Any) -> None:
         if not self._is_planning:
             self._is_planning = True
             self._proposed = None
-            self._heading(f"Planning, at {event.t:.1f} s" if self._plans else "Planning before the first motion")
+            self._heading(f"Planning, at {event.t:.1f} s" if self._plans else "Planning before anything is done")
         plan = data["plan"]
         lead, failed = f"Round {data['round']}: ", planner_failed(event)
         if failed:
@@ -112,6 +122,13 @@ class _Teller:
 
     def _refined_again(self, event: Event, data: Any) -> None:
         self._say(f"{data['action']} was worked out anew: {data['reason']}.", f"{event.t:7.1f} s          ")
+
+    def _skipped(self, event: Event, data: Any) -> None:
+        self._say(f"Skipped, as it was done already: {', '.join(data['actions'])}.", f"{event.t:7.1f} s          ")
+
+    def _redone(self, event: Event, data: Any) -> None:
+        lacking = f", as {', '.join(data['lacking'])} did not hold" if data["lacking"] else ""
+        self._say(f"To be done again{lacking}: {', '.join(data['actions'])}.", f"{event.t:7.1f} s          ")
 
     def _replan(self, event: Event, data: Any) -> None:
         if self._running is not None:
@@ -186,10 +203,10 @@ _ENDINGS = {
     "goal_reached": "The goal was reached.",
     "planned": "A plan was found.",
     "proven_infeasible": "The goal was proven out of reach: {reason}.",
-    "no_plan": "No plan was found within the budget: {reason}.",
+    "no_plan": "There was no plan: {reason}.",
     "gave_up": "The run gave up: {reason}.",
     "crashed": "The run ended with an error in the program ({reason}); crash.txt in its folder tells where.",
-    "interrupted": "The run was interrupted before its end.",
+    "interrupted": "Before its end {reason}.",
 }
 
 

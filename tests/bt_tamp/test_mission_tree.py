@@ -106,6 +106,12 @@ class World:
             self.t += TICK
         return self
 
+    def reports(self):
+        """What is reported from now on."""
+        told = []
+        self.context.report = lambda kind, **data: told.append((kind, data))
+        return told
+
     def until_done(self, limit=200):
         for _ in range(limit):
             if self.tick().mission.goal.status is Status.SUCCESS:
@@ -163,9 +169,11 @@ def test_what_somebody_else_has_done_is_skipped_without_a_new_plan():
     while "end a" not in world.log:
         world.tick()
     world.facts = frozenset({AT["b"]})
+    told = world.reports()
     world.until_done()
     assert "begin b" not in world.log
     assert world.log.count("plan") == 1
+    assert ("skipped", {"actions": ["go(a, b)"]}) in told
 
 
 def test_what_was_undone_is_done_again_without_a_new_plan():
@@ -173,9 +181,11 @@ def test_what_was_undone_is_done_again_without_a_new_plan():
     while "end b" not in world.log:
         world.tick()
     world.facts = frozenset({AT["start"]})
+    told = world.reports()
     world.until_done()
     assert world.log.count("begin a") == 2
     assert world.log.count("plan") == 1
+    assert ("redone", {"actions": ["go(start, a)", "go(a, b)"], "lacking": ["at(a)"]}) in told
 
 
 def test_an_action_that_ends_without_its_effect_is_done_once_more_and_then_fails():

@@ -1,5 +1,6 @@
 import pytest
 
+from bt_tamp.cli import main
 from bt_tamp.report.events import Event, read_events
 from bt_tamp.report.live import PlainLines, watcher
 from bt_tamp.report.result import PressedMotion, RunResult, UnintendedContact
@@ -57,6 +58,35 @@ def test_a_task_planner_that_failed_is_not_taken_for_one_that_found_the_goal_out
     assert sentence(events[1]) == "round 1: the task planner failed (MemoryError: too much)"
 
 
+def test_the_story_of_a_run_that_goes_on_tells_its_options_what_was_skipped_and_what_was_done_again() -> None:
+    events = [
+        Event("run_started", 0.0, {"scene": "desk", "seed": 0, "choices": {"contact": "impedance"}, "resumed": True}),
+        Event("skipped", 1.0, {"actions": FIRST}),
+        Event("redone", 2.0, {"actions": FIRST[:1], "lacking": ["holding(book)"]}),
+    ]
+    interrupted = RunResult("desk", 0, "interrupted", "the run was interrupted, the arm brought to rest", {})
+    told = " ".join(story(events, interrupted).split())
+    for expected in (
+        "desk, seed 0 (gone on from where another run ended), --contact impedance",
+        "1.0 s Skipped, as it was done already: pick(book, table), place(book, crate).",
+        "2.0 s To be done again, as holding(book) did not hold: pick(book, table).",
+        "Before its end the run was interrupted, the arm brought to rest.",
+    ):
+        assert expected in told
+    assert sentence(events[1]) == "skipped, as it is done already: pick(book, table), place(book, crate)"
+
+
+def test_an_event_that_lacks_something_is_named_in_one_line(tmp_path, capsys) -> None:
+    (tmp_path / "scenario.json").write_text("{}")
+    for line, said in (
+        ('{"t": 0, "kind": "run_started"}', "event 'run_started' at 0 s: lacks 'seed'"),
+        ('{"t": null, "kind": "run_started"}\n{"t": 0, "kind": "x"}', "events.jsonl, line 1: expected an event"),
+    ):
+        (tmp_path / "events.jsonl").write_text(line + "\n")
+        assert main(["explain", str(tmp_path)]) == 2
+        assert said in capsys.readouterr().err
+
+
 def test_the_story_tells_plans_failures_lessons_deeds_and_end_in_their_order() -> None:
     told = " ".join(story(EVENTS, RESULT).split())
     expected = [
@@ -72,7 +102,7 @@ def test_the_story_tells_plans_failures_lessons_deeds_and_end_in_their_order() -
         "pick(book, table) failed in its phase 'close': the fingers closed on air.",
         "a new one sought",
         "Round 3: with what had been learned, no sequence of actions led to the goal.",
-        "No plan was found within the budget: no plan found.",
+        "There was no plan: no plan found.",
         "in_bin(book, crate) did not hold",
         "drag(book, table) pressed with 8.10 N, 8 N wanted: off by 2.5% (RMS), peak 9.5 N",
         "finger and vase at 1.0 s, 3.2 N (drag(book, table) descend)",

@@ -1,6 +1,7 @@
 """Going on from where another run ended."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -49,6 +50,34 @@ def test_a_state_is_read_as_it_was_written_and_fits_its_scene_only(cut_short):
 def test_a_run_begins_with_a_scene_or_where_another_ended(arguments, capsys):
     assert main(["run", *arguments]) == 2
     assert capsys.readouterr().err == "bt-tamp: expected either a SCENE or --resume DIR\n"
+
+
+def test_a_run_goes_on_with_the_options_it_began_with_but_for_those_given(tmp_path, capsys):
+    def choices(*arguments):
+        assert main(["run", *map(str, arguments), "--max-sim-time", "0.1"]) == 12
+        begun = (tmp_path / arguments[-1].name / "events.jsonl").read_text().splitlines()[0]
+        return json.loads(begun)["choices"]
+
+    first = choices("fig2", "--no-replan", "--tries", 7, "--out", tmp_path / "first")
+    assert first == {"tries": 7, "replan": False, "max_sim_time": 0.1}
+    assert "Again: bt-tamp run fig2 --seed 0 --tries 7 --no-replan --max-sim-time 0.1\n" in capsys.readouterr().out
+    again = choices("--resume", tmp_path / "first", "--tries", 9, "--out", tmp_path / "again")
+    assert again == {"tries": 9, "replan": False, "max_sim_time": 0.1}
+
+
+def test_a_run_that_goes_on_has_its_seed(tmp_path, capsys):
+    assert main(["run", "--resume", str(tmp_path), "--seed", "3"]) == 2
+    assert "--seed 3: can't go with --resume" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("choices", ['{"speed": 3}', '{"tries": 0}', "7", '{"domain": "a.pddl"}'])
+def test_choices_that_no_run_wrote_are_refused(choices, cut_short, tmp_path, capsys):
+    folder = tmp_path / "run"
+    shutil.copytree(cut_short, folder)
+    (folder / "events.jsonl").write_text(f'{{"t": 0, "kind": "run_started", "choices": {choices}}}\n')
+    assert main(["run", "--resume", str(folder), "--out", str(tmp_path / "again")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "again").exists()
 
 
 def test_a_folder_without_a_state_is_refused(tmp_path, capsys):

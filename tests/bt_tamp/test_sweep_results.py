@@ -1,6 +1,7 @@
 """What is made of the results of sweeps."""
 
 import csv
+import json
 import os
 import sqlite3
 from dataclasses import replace
@@ -13,9 +14,10 @@ from hypothesis import strategies as st
 from bt_tamp.cli import main
 from bt_tamp.commands.choices import options_of
 from bt_tamp.options import RunOptions
+from bt_tamp.replay import choices_of, replay_command
 from bt_tamp.report.result import Befallen, RunResult
 from bt_tamp.sweep import MAX_TRIES, Finished, Job, run_jobs
-from bt_tamp.sweep_results import at_95, lines, replay_command, runs_of, wilson
+from bt_tamp.sweep_results import at_95, lines, runs_of, wilson
 from bt_tamp.sweep_store import SweepStore
 
 MOVED = Befallen(
@@ -158,11 +160,15 @@ def test_wilson_as_it_stands_in_books():
 def test_the_command_names_every_choice_and_means_the_same_run():
     from bt_tamp.cli import parser
 
-    options = RunOptions(seed=4, disturb=("moved", "push"), replan=False, contact="impedance", max_sim_time=120.0)
+    options = RunOptions(
+        seed=4, disturb=("moved", "push"), replan=False, contact="impedance", max_sim_time=120.12345678
+    )
     data = {name: value for name, value in vars(options).items() if name != "seed"}
     command = replay_command("fig1", 4, data | {"disturb": list(options.disturb), "digest": "abc"})
     arguments = parser().parse_args(command.split()[1:])
     assert options_of(arguments) == options
+    assert replay_command("fig1", 4, json.loads(json.dumps(choices_of(options)))) == command
+    assert choices_of(RunOptions(seed=4, window=True)) == {}
 
 
 def test_runs_of_all_scenes_come_together_in_one_line_a_class_and_in_one_sentence_at_the_end(store, capsys):
