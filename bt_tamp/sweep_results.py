@@ -208,9 +208,9 @@ def reactions_of(results: Iterable[RunResult]) -> list[float]:
 
 
 def undone_s(disturbed: RunResult, plain: RunResult) -> float | None:
-    """How long the action took, in the undisturbed run, that the first disturbance undid: the one that was running, if
-    it was about the same body, else the first that was. None if there was no such action."""
-    told = [one for one in disturbed.disturbances if one.bodies]
+    """How long the action took, in the undisturbed run, that the first disturbance undid which had to be answered: the
+    one that was running, if it was about the same body, else the first that was. None if there was no such action."""
+    told = [one for one in disturbed.disturbances if one.bodies and one.answer]
     if not told or len(plain.executed) != len(plain.executed_s):
         return None
     took = dict(zip(reversed(plain.executed), reversed(plain.executed_s), strict=True))

@@ -1,12 +1,12 @@
 """Sum up what sweeps have stored, by scene and class of disturbance; plots and CSV with --out.
 
 success: goal reached, or the right verdict where the class declares that it can't be; with its 95 % interval (Wilson).
-Runs that ended before anything that matters befell them are no success: they are left out, and counted as unmet.
+Goals reached before anything that matters befell the run are no success: they are left out, and counted as unmet.
 lost s: robot time beyond the undisturbed run of the same scene and seed, median; × action: as a multiple of the action
-that was undone. react s: from when a disturbance of the running action could be seen (at once, but where poses come
-late or not at all) until the arm stood still or set out anew, thinking included, where that took no new task plan:
-median / 95 %. peak N: the largest true force. broken: torques beyond their limit, or NaN. --together makes one line of
-all scenes' runs of a class.
+that was undone, where the run had to answer. react s: from when a disturbance of the running action could be seen (at
+once, but where poses come late or not at all) until the arm stood still or set out anew, thinking included, where that
+took no new task plan: median / 95 %. peak N: the largest true force. broken: torques beyond their limit, or NaN.
+--together makes one line of all scenes' runs of a class.
 """
 
 import argparse
@@ -89,7 +89,7 @@ def _print(found: "list[Line]", runs: "list[Run]") -> None:
 
 
 def _shown(value: float | None) -> str:
-    return "–" if value is None else f"{value:.1f}"
+    return "–" if value is None else f"{value:z.1f}"
 
 
 def _export(folder: Path, found: "list[Line]", runs: "list[Run]") -> None:

@@ -65,6 +65,16 @@ def test_time_is_lost_against_the_undisturbed_run_of_the_same_seed(store):
     assert found["moved", False].succeeded == 0
 
 
+def test_time_is_set_against_an_undone_action_only_where_the_run_had_to_answer(store):
+    with SweepStore(store) as opened:
+        calm = finished(2, 22.0, ("moved",))
+        data = RunResult.from_json(calm.result)
+        unanswered = tuple(replace(one, answer="") for one in data.disturbances)
+        opened.add(replace(calm, result=replace(data, disturbances=unanswered).to_json()))
+    line = table(store)["moved", True]
+    assert (line.succeeded, line.lost_s, line.lost_actions) == (3, 4.0, 5.0 / 4.0)
+
+
 def test_where_the_goal_cannot_be_reached_the_right_verdict_is_the_success(store):
     assert table(store)["taken-for-good", True].succeeded == 1
 
