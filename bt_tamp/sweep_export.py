@@ -60,7 +60,10 @@ def plot(folder: Path, lines: Sequence[Line]) -> list[Path]:
                 if line.lost_s is not None:
                     right.barh([y], [line.lost_s], height=0.28, color=colour)
         left.set_yticks(range(len(names)), names)
-        left.invert_yaxis()
+        left.set_ylim(len(names) - 0.4, -0.6)
+        for axes in (left, right):
+            axes.grid(axis="x", color="0.9")
+            axes.set_axisbelow(True)
         left.set_xlim(0.0, 1.02)
         left.set_xlabel("success rate, 95 % interval")
         left.set_title(f"{scene_name(scene)}: watching (blue), open loop (red)")
