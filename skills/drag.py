@@ -9,7 +9,9 @@ from py_trees.behaviour import Behaviour
 
 from planner.failure import MotionFailure, RefinementFailure
 from planner.refinement import Budget, Hints, Phase, Refinement
+from planner.task.facts import place_of
 from planner.task.symbols import GroundAction
+from scenarios.names import TABLE
 from scenarios.scenario import Body, Table
 from scenarios.shapes import reach
 from sim.scene import SceneState
@@ -167,6 +169,8 @@ class Drag:
             if pull is None or name not in scene.poses:
                 return False
             body, table = scene.scenario.bodies[name], scene.scenario.table
+            if place_of(scene, name) != TABLE:
+                return False
             out = standing_out(body, scene.poses[name], table, pull.end.edge)
             tow = run.phase("drag").trajectory
             start, end = (context.robot.X_WG(q).translation for q in (tow.at(0.0)[0], tow.end))

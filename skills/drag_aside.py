@@ -9,7 +9,9 @@ from py_trees.behaviour import Behaviour
 
 from planner.failure import MotionFailure, RefinementFailure
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
+from planner.task.facts import place_of
 from planner.task.symbols import GroundAction
+from scenarios.names import TABLE
 from scenarios.scenario import Body
 from scenarios.shapes import bounds
 from sim.scene import Held, SceneState
@@ -101,7 +103,7 @@ class DragAside:
 
         def is_there(scene: SceneState) -> bool:
             shift: Shift | None = run.refinement.sample if run.refinement else None
-            if shift is None or name not in scene.poses:
+            if shift is None or name not in scene.poses or place_of(scene, name) != TABLE:
                 return False
             return float(np.hypot(*(scene.poses[name].translation[:2] - [shift.x, shift.y]))) < ARRIVED
 

@@ -33,6 +33,8 @@ class LiftOff(Behaviour):
 
     def initialise(self) -> None:
         self._since, self._has_begun = self._context.observation.t, False
+        if self._context.scene.held is None:  # What was lost on the way weighs on nothing any more.
+            self._context.controller.clear_payload()
 
     def _begin(self) -> None:
         context = self._context

@@ -12,6 +12,7 @@ from py_trees.composites import Sequence
 
 from planner.failure import ArmStopped, ContactLost, ExecutionFailure, ForceExceeded, GraspMissed, PathBlocked
 from planner.refinement import Phase
+from sim.plant import Observation
 from skills.context import ActionRun, SkillContext
 from skills.control.reference import Reference
 from skills.payload import load_of
@@ -29,6 +30,11 @@ STILL = 0.002
 
 SETTLE = 0.15
 RELEASE_TIME = 2.0
+CLOSE_TIME = 3.0
+"""Seconds after which the fingers count as closed, even if they never came to rest."""
+
+READINGS = 8
+"""Looks at the wrist sensor with which it is weighed what the hand holds, and that it holds nothing."""
 
 
 def sequence(name: str, *children: Behaviour) -> Behaviour:
@@ -136,21 +142,28 @@ class Open(PhaseLeaf):
 
 
 class Close(PhaseLeaf):
-    """Closes the fingers until the object resists, and takes its weight into the arm's model."""
+    """Closes the fingers until the object resists, and takes its weight into the arm's model.
+
+    readings: the first few observations, when nothing is held yet.
+    """
 
     def begin(self) -> None:
         self._context.controller.hold()
         self._context.grip.close(self.phase.grip)
         self._still_since: float | None = None
+        self.readings: list[Observation] = []
 
     def watch(self) -> Status:
         context = self._context
         observation = context.observation
+        if len(self.readings) < READINGS:
+            self.readings.append(observation)
         if abs(observation.opening_velocity) > STILL or self.elapsed < SETTLE:
             self._still_since = None
         elif self._still_since is None:
             self._still_since = observation.t
-        if self._still_since is None or observation.t - self._still_since < SETTLE:
+        is_still = self._still_since is not None and observation.t - self._still_since >= SETTLE
+        if not is_still and self.elapsed < CLOSE_TIME:
             return Status.RUNNING
         name = self._run.action.args[0]
         if context.scene.held is None or context.scene.held.name != name:

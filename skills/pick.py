@@ -80,12 +80,13 @@ class Pick:
     def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:
         name = run.action.args[0]
         reach = sequence("to the grasp", Follow("pre-grasp", run, context), Follow("approach", run, context))
+        close = Close("close", run, context)
         return sequence(
             str(run.action),
             guarded("reach", Refine(run, context, self._kit.motion), reach),
-            guarded("grasp", Unladen(name, run, context), Close("close", run, context)),
+            guarded("grasp", Unladen(name, run, context), close),
             guarded("hold", HandHolds(name, run, context), Follow("lift", run, context)),
-            Weigh(run, context),
+            Weigh(run, context, close),
             Achieved(lambda scene: scene.held is not None and scene.held.name == name, run, context),
         )
 

@@ -70,6 +70,9 @@ class Refine(Behaviour):
                     context.controller.hold()
             if not context.controller.finished and now - self._stopping_since < PATIENCE:
                 return Status.RUNNING
+            gone = [arg for arg in self._run.action.args if self._is_gone(arg)]
+            if gone:
+                return self._fail(SceneChanged(self._run.action, f"{gone[0]} is gone"))
             self._scene = context.scene
             self._outcome, cost = context.refine(self._run.action)
             self._ready_at = now + cost
@@ -83,9 +86,16 @@ class Refine(Behaviour):
         self._bear_what_is_held()
         return Status.SUCCESS
 
+    def _is_gone(self, name: str) -> bool:
+        scene = self._context.scene
+        return name in scene.scenario.bodies and name not in scene.poses
+
     def _bear_what_is_held(self) -> None:
         held = self._context.scene.held
-        if held is not None and held.name != self._borne:
+        if held is None:
+            self._context.controller.clear_payload()
+            self._borne = ""
+        elif held.name != self._borne:
             self._context.controller.set_payload(*load_of(self._context.scene, held.name))
             self._borne = held.name
 

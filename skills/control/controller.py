@@ -141,8 +141,9 @@ class ArmController:
         self._use(self._unloaded.with_payload(mass, load.lever, load.inertia), load)
 
     def clear_payload(self) -> None:
-        """The hand is empty again."""
-        self._use(self._unloaded, None)
+        """The hand is empty again. Calling it again changes nothing."""
+        if self._robot is not self._unloaded:
+            self._use(self._unloaded, None)
 
     def _use(self, robot: RobotModel, load: pin.Inertia | None) -> None:
         self._robot, self._dynamics = robot, Dynamics(robot)

@@ -9,6 +9,7 @@ from scipy import sparse
 
 from sim.plant import Observation
 from sim.robot import GRAVITY, RobotModel
+from sim.wrench import Wrench
 from skills.control.contact import hand_inertia
 
 REACH = 0.15
@@ -26,21 +27,15 @@ def estimate_payload(robot: RobotModel, samples: Sequence[Observation]) -> tuple
     """
     if not samples:
         raise ValueError("payload estimation needs at least one wrist reading, got none")
-    hand = hand_inertia(robot)
-    data = robot.data()
     regressor, residual = [], []
     for sample in samples:
-        pin.forwardKinematics(robot.model, data, sample.q)
-        rotation = pin.updateFramePlacement(robot.model, data, robot.tcp_id).rotation
-        g = rotation.T @ np.array([0.0, 0.0, -GRAVITY])
-        felt = robot.X_EG.actInv(pin.Force(sample.wrist.vector))
-        weight = hand * pin.Motion(g, np.zeros(3))
+        g, beyond_hand = _felt(robot, sample)
         # In the unknowns (m, m c): force m g, torque (m c) × g.
         block = np.zeros((6, 4))
         block[:3, 0] = g
         block[3:, 1:] = -pin.skew(g)
         regressor.append(block)
-        residual.append((felt - weight).vector)
+        residual.append(beyond_hand.vector)
     A, b = np.vstack(regressor), np.concatenate(residual)
     # Torques are small numbers: in units of 0.1 m they weigh as much as the forces.
     scale = np.tile([1.0, 1.0, 1.0, 10.0, 10.0, 10.0], len(samples))
@@ -62,3 +57,23 @@ def estimate_payload(robot: RobotModel, samples: Sequence[Observation]) -> tuple
     mass = max(float(solution[0]), 0.0)
     com = solution[1:] / mass if mass > 1e-3 else np.zeros(3)
     return mass, com
+
+
+def wrist_error(robot: RobotModel, samples: Sequence[Observation]) -> Wrench:
+    """What the wrist sensor reads, on average, beyond the weight of the empty hand held still: its error, in its own
+    frame. Raises ValueError without samples."""
+    if not samples:
+        raise ValueError("the wrist's error needs at least one reading, got none")
+    beyond_hand = [robot.X_EG.act(_felt(robot, sample)[1]).vector for sample in samples]
+    mean = np.mean(beyond_hand, axis=0)
+    return Wrench(mean[:3], mean[3:])
+
+
+def _felt(robot: RobotModel, sample: Observation) -> tuple[np.ndarray, pin.Force]:
+    """Gravity (3,) in G, and what the wrist feels beyond the weight of the empty hand, in G."""
+    data = robot.data()
+    pin.forwardKinematics(robot.model, data, sample.q)
+    rotation = pin.updateFramePlacement(robot.model, data, robot.tcp_id).rotation
+    g = rotation.T @ np.array([0.0, 0.0, -GRAVITY])
+    felt = robot.X_EG.actInv(pin.Force(sample.wrist.vector))
+    return g, felt - hand_inertia(robot) * pin.Motion(g, np.zeros(3))
