@@ -13,10 +13,13 @@ from scenarios.scenario import Scenario
 from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, outline
 from sim.plant import Observation
 from sim.robot import RobotModel
-from sim.scene import Held, SceneState
+from sim.scene import Held, SceneState, pose_distance
 
 GRIP_FORCE = 5.0
-"""Newtons below which the fingers hold nothing."""
+"""Newtons below which the fingers hold nothing, but for what is seen to stay where it was between them."""
+
+STAYS = 0.008
+"""Metres in the hand within which that is."""
 
 GRASP_REACH = 0.008
 KEEP_REACH = 0.025
@@ -45,6 +48,7 @@ class Belief:
         self._lying = defaultdict[str, Sighting](Sighting)
         self._in_hand = Sighting()
         self._X_GO: SE3 | None = None
+        self._X_GO_pressed: SE3 | None = None
         self._known: dict[str, tuple[float, SE3]] = {}
         self._hands: deque[tuple[float, SE3]] = deque()
         self._was_blind = False
@@ -67,10 +71,12 @@ class Belief:
                 self._in_hand = Sighting()
                 self._X_GO = X_WG.inverse() * poses[self._held]
             poses[self._held] = X_WG * self._X_GO
+            if observation.grip_force >= GRIP_FORCE:
+                self._X_GO_pressed = self._X_GO
             self._known[self._held] = (observation.t, poses[self._held])
             held = Held(self._held, self._X_GO)
         else:
-            self._X_GO = None
+            self._X_GO = self._X_GO_pressed = None
         return SceneState(self._scenario, poses, self._within_limits(observation.q), observation.opening, held)
 
     def _within_limits(self, q: np.ndarray) -> np.ndarray:
@@ -121,8 +127,15 @@ class Belief:
         moved = {name: replace(declared[name], X_WR=X_WR) for name, X_WR in regions.items()}
         self._scenario = replace(self._declared, regions={**declared, **moved})
 
+    def _stays(self, observation: Observation) -> bool:
+        """Is what was held seen where it was when the fingers last pressed on it?"""
+        if self._held not in observation.poses or self._X_GO is None or self._X_GO_pressed is None:
+            return False
+        return pose_distance(self._X_GO, self._X_GO_pressed)[0] < STAYS
+
     def _held_name(self, observation: Observation, X_WG: SE3, poses: Mapping[str, SE3], is_closing: bool) -> str | None:
-        if not is_closing or observation.grip_force < GRIP_FORCE:
+        is_pressed = observation.grip_force >= GRIP_FORCE
+        if not is_closing or not (is_pressed or self._stays(observation)):
             return None
         if abs(observation.opening_velocity) > FINGERS_AT_REST and self._held is None:
             return None
@@ -133,6 +146,8 @@ class Belief:
 
         if self._held is not None and self._held in poses and gap(self._held) < KEEP_REACH:
             return self._held
+        if not is_pressed:
+            return None
         nearest = min(poses, key=gap, default=None)
         return nearest if nearest is not None and gap(nearest) < GRASP_REACH else None
 

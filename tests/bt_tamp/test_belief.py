@@ -125,12 +125,25 @@ def test_what_is_held_and_seen_late_is_where_the_hand_has_brought_it(scenario):
     assert pose_distance(scene.poses["sponge"], ROBOT.X_WG(path[-1]) * IN_HAND)[0] < 1e-6
 
 
-def test_fingers_that_lose_their_force_hold_nothing(scenario):
+def test_what_fingers_without_force_hold_is_held_until_it_is_seen_to_leave_them(scenario):
     belief, q = Belief(scenario, ROBOT), scenario.robot.q0
     assert belief.update(held_at(scenario, q, IN_HAND, 0.0), True).held is not None
-    look = held_at(scenario, q, IN_HAND, 0.1)
-    empty = Observation(**(vars(look) | {"grip_force": 0.5}))
-    assert belief.update(empty, True).held is None
+    lower = SE3(np.eye(3), IN_HAND.translation + np.array([0.0, 0.0, 0.012]))
+
+    def limp(X_GO, t):
+        return Observation(**(vars(held_at(scenario, q, X_GO, t)) | {"grip_force": 0.5}))
+
+    assert belief.update(limp(IN_HAND, 0.1), True).held is not None
+    assert belief.update(limp(IN_HAND, 0.5), True).held is not None
+    assert belief.update(limp(lower, 0.6), True).held is None
+    assert belief.update(limp(IN_HAND, 0.7), True).held is None
+
+
+def test_what_fingers_without_force_hold_out_of_sight_is_not_held(scenario):
+    belief, q = Belief(scenario, ROBOT), scenario.robot.q0
+    belief.update(held_at(scenario, q, IN_HAND, 0.0), True)
+    dark = seen(scenario, 0.1, q=q, poses={}, grip_force=0.5, opening=0.05)
+    assert belief.update(dark, True).held is None
 
 
 def test_a_bin_is_believed_where_it_is_seen(scenario):
