@@ -68,20 +68,18 @@ class Refinement:
     action: GroundAction
     sample: Any
     phases: tuple[Phase, ...]
-    checks: int = 0
     crashes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Budget:
-    """How much one refinement may cost: samples tried, and planner checks per motion query."""
+    """How much one refinement may cost: samples tried."""
 
     tries: int = 20
-    motion_checks: int = 4000
 
     def widened(self, factor: int = 2) -> "Budget":
         """The same budget, `factor` times as large."""
-        return Budget(self.tries * factor, self.motion_checks * factor)
+        return Budget(self.tries * factor)
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from planner.task.sexpr import PddlError
 from planner.task.situation import Situation
 from planner.task.symbols import Fact, GroundAction, NoTaskPlan, Step, TaskPlan, flaw
 from scenarios.names import known
-from sim.scene import SceneState
+from sim.scene import SceneState, is_on_floor
 
 MAX_PROBES = 3
 """Further actions that are looked at, at most, when one like them was found obstructed."""
@@ -42,14 +42,13 @@ FORGIVEN = 3
 class PlanSettings:
     """Bounds of planning, all counted, none in seconds.
 
-    tries: samples for an action in a round. motion_checks: for a motion query. max_rounds: task
-    plans that are refined. max_expansions: search nodes of one task plan. backtracks: choices
-    revised in refining one task plan. widenings: how often the budgets are doubled. search: how
-    the task planner searches (`planner.task.pyperplan_.SEARCHES`).
+    tries: samples for an action in a round. max_rounds: task plans that are refined. max_expansions:
+    search nodes of one task plan. backtracks: choices revised in refining one task plan. widenings:
+    how often the tries are doubled. search: how the task planner searches
+    (`planner.task.pyperplan_.SEARCHES`).
     """
 
     tries: int = 20
-    motion_checks: int = 4000
     max_rounds: int = 20
     max_expansions: int = 10_000
     backtracks: int = 4
@@ -108,7 +107,7 @@ class SearchThenSample:
         self._report = report
         self._actions = ActionRefiner(refiners, self.learned, report)
         self._plans = PlanRefiner(self._actions, self._state, settings.backtracks, report)
-        self._budget = Budget(settings.tries, settings.motion_checks)
+        self._budget = Budget(settings.tries)
         self._samples: dict[GroundAction, tuple[Any, ...]] = {}
         self._stated: tuple[SceneState, frozenset[Fact]] | None = None
 
@@ -174,7 +173,7 @@ class SearchThenSample:
         self, scene: SceneState, goal: frozenset[Fact], rng: np.random.Generator, work: Work
     ) -> Solution | NoPlan:
         settings = self._settings
-        self._budget = Budget(settings.tries, settings.motion_checks)
+        self._budget = Budget(settings.tries)
         widenings, forgiven = settings.widenings, FORGIVEN
         met: set[tuple[Any, ...]] = set()
         for number in range(1, settings.max_rounds + 1):
@@ -281,7 +280,7 @@ class SearchThenSample:
     def _widen(self) -> None:
         self._budget = self._budget.widened()
         self.learned.retract(self._budget.tries)
-        self._report("widened", {"tries": self._budget.tries, "motion_checks": self._budget.motion_checks})
+        self._report("widened", {"tries": self._budget.tries})
 
     def _proof(
         self, scene: SceneState, goal: frozenset[Fact], found: NoTaskPlan, work: Work, number: int
@@ -303,7 +302,9 @@ class SearchThenSample:
         reasons += lacking(self._domain, self.facts(scene), missing)
         if reasons:
             reason += f": {'; '.join(reasons)}"
-        return NoPlan("proven", reason, proofs.culprits().union(lost), number)
+        # What leans or is heaped up somewhere may yet fall to where it can be taken from.
+        may_change = any(not is_on_floor(scene, name) for name in lost)
+        return NoPlan("budget" if may_change else "proven", reason, proofs.culprits().union(lost), number)
 
     def _is_lost(self, scene: SceneState, name: str) -> bool:
         is_held = scene.held is not None and scene.held.name == name

@@ -55,5 +55,8 @@ def _supports(standing: Standing, name: str) -> frozenset[str]:
 
 
 def _is_below(lower: Solid, upper: Solid) -> bool:
-    """Does the one lie beneath the other, rather than beside it?"""
-    return not overlap(lower.moved(SE3(np.eye(3), np.array([0.0, 0.0, -4 * GAP]))), upper)
+    """Does the one lie beneath the other, rather than beside it? Then lowering it, or raising the other a little, parts
+    them."""
+    parted = lower.moved(SE3(np.eye(3), np.array([0.0, 0.0, -4 * GAP])))
+    raised = upper.moved(SE3(np.eye(3), np.array([0.0, 0.0, GAP])))
+    return not overlap(parted, upper) and not overlap(lower, raised)

@@ -63,6 +63,10 @@ class SceneState:
         return replace(self, poses={n: X for n, X in self.poses.items() if n not in names})
 
 
+ON_FLOOR = 0.01
+"""Metres above the floor up to which something is on it."""
+
+
 def pose_distance(X_WA: SE3, X_WB: SE3) -> tuple[float, float]:
     """Distance in metres and angle in rad between two poses."""
     if X_WA is X_WB:  # A body that lies still is observed as the same object again.
@@ -78,6 +82,13 @@ def floor_height(scenario: Scenario) -> float:
     bottoms += [_bottom(Box(region.size), region.X_WR) for region in scenario.regions.values()]
     bottoms += [_bottom(fixture.shape, fixture.X_WO) for fixture in scenario.fixtures.values()]
     return min(bottoms)
+
+
+def is_on_floor(scene: SceneState, name: str) -> bool:
+    """Does a body touch the floor?"""
+    X_WO = scene.poses[name]
+    lowest = float(X_WO.translation[2]) - depth_below(scene.scenario.bodies[name].shape, X_WO.rotation)
+    return lowest < floor_height(scene.scenario) + ON_FLOOR
 
 
 def pedestal(scenario: Scenario) -> tuple[Box, SE3] | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from py_trees.behaviour import Behaviour
@@ -13,7 +14,7 @@ from planner.support import supports
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Body
 from sim.robot import GRAVITY, Gripper
-from sim.scene import Held, SceneState
+from sim.scene import Held, SceneState, pose_distance
 from skills.carrying import MAX_ACCELERATION
 from skills.conditions import Achieved, HandHolds, Unladen
 from skills.context import ActionRun, SkillContext
@@ -38,6 +39,12 @@ GRIP_FORCE = (15.0, 70.0)
 GRIP_SAFETY = 40.0
 """How much more than an object asks for while it is carried each finger presses, between those bounds: it must not turn
 in the hand either. Pressed much harder than that, something light creeps from between the pads."""
+
+GIVEN_UP = 2
+"""How often a grasp may fail in execution before all others are tried first."""
+
+NEAR = 0.01, float(np.radians(10.0))
+"""Metres and rad within which two grasps are alike."""
 
 SQUEEZE = 0.002
 """Metres by which the fingers may sink into something soft."""
@@ -65,7 +72,7 @@ class Pick:
         def attempt(grasp: Grasp, world: SceneState) -> tuple[Phase, ...] | MotionFailure | Unfit:
             return self._attempt(action, grasp, world)
 
-        samples = self._grasps(action.args[0], scene, rng)
+        samples = _unproven_last(self._grasps(action.args[0], scene, rng), hints)
         nothing = f"no two sides of {action.args[0]} fit between the fingers"
         return refine_by_sampling(action, scene, samples, attempt, budget, hints, nothing)
 
@@ -151,6 +158,32 @@ class Pick:
             ),
             Phase("lift", "approach", lift, grasp.width, grasped.held, resting),
         )
+
+
+def _unproven_last(found: Iterator[Grasp], hints: Hints) -> Iterator[Grasp]:
+    """Grasps, those last that lost the object or missed it time and again where it lay before, and never held it."""
+
+    def has_failed(grasp: Grasp) -> bool:
+        fails = sum(_is_near(grasp, other) for other in hints.failed)
+        return fails >= GIVEN_UP and not any(_is_near(grasp, other) for other in hints.done)
+
+    if not hints.failed:
+        yield from found
+        return
+    failed = []
+    for grasp in found:
+        if has_failed(grasp):
+            failed.append(grasp)
+        else:
+            yield grasp
+    yield from failed
+
+
+def _is_near(grasp: Grasp, other: Any) -> bool:
+    if not isinstance(other, Grasp):
+        return False
+    distance, turn = pose_distance(grasp.X_OG, other.X_OG)
+    return distance < NEAR[0] and turn < NEAR[1]
 
 
 def grip_force(body: Body, gripper: Gripper) -> float:

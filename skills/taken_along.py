@@ -1,5 +1,6 @@
 """A drag as it is carried out: does the object come along, and is it pressed harder where it doesn't?"""
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -107,7 +108,9 @@ class Tow(Slide):
         X_WO = self._context.scene.poses.get(self._run.action.args[0])
         if X_WO is None or self._p_WO_end is None:
             return False
-        return float((self._p_WO_end - X_WO.translation) @ self._along) <= self.pressing.speed * BRAKING / 2
+        left = float((self._p_WO_end - X_WO.translation) @ self._along)
+        late = _lateness(self._context, self._run.action.args[0])
+        return left <= self.pressing.speed * (BRAKING / 2 + late)
 
     def _braking(self) -> tuple[Trajectory, float]:
         """The path that is followed, and the time on it at which the hand can come to rest."""
@@ -155,6 +158,7 @@ class TakenAlong(Behaviour):
         self._began: np.ndarray | None = None
         self._forgiven = 0.0
         self._raises = 0
+        self._hand: deque[tuple[float, np.ndarray]] = deque()
 
     def terminate(self, new_status: Status) -> None:
         if new_status == Status.INVALID:
@@ -185,10 +189,22 @@ class TakenAlong(Behaviour):
 
     def _tip(self) -> np.ndarray:
         """Where the fingertips are on the object (3,), in its frame, whatever their height; in metres."""
-        context = self._context
-        X_WO = context.scene.poses[self._run.action.args[0]]
-        up_O, tip_O = X_WO.rotation[2], X_WO.actInv(context.robot.X_WG(context.observation.q).translation)
+        context, name = self._context, self._run.action.args[0]
+        X_WO = context.scene.poses[name]
+        up_O, tip_O = X_WO.rotation[2], X_WO.actInv(self._hand_when_seen(name))
         return tip_O - float(up_O @ tip_O) * up_O
+
+    def _hand_when_seen(self, name: str) -> np.ndarray:
+        """Where the tool centre was (3,) in W when the object was seen as it is believed now."""
+        context = self._context
+        now = context.observation.t
+        self._hand.append((now, context.robot.X_WG(context.observation.q).translation.copy()))
+        then = now - _lateness(context, name)
+        while len(self._hand) > 2 and self._hand[1][0] <= then:
+            self._hand.popleft()
+        (t_a, p_a), (t_b, p_b) = self._hand[0], self._hand[min(1, len(self._hand) - 1)]
+        share = 0.0 if t_b <= t_a else min(max((then - t_a) / (t_b - t_a), 0.0), 1.0)
+        return p_a + share * (p_b - p_a)
 
     def _slipped(self, reason: str) -> Status:
         action, refinement = self._run.action, self._run.refinement
@@ -196,6 +212,12 @@ class TakenAlong(Behaviour):
         self._context.fail(DragSlipped(action, f"{action.args[0]} lagged behind the hand: {reason}", sample))
         self.feedback_message = reason
         return Status.FAILURE
+
+
+def _lateness(context: SkillContext, name: str) -> float:
+    """Seconds since an object was seen as it is believed now."""
+    now = context.observation.t
+    return now - context.observation.seen_at.get(name, now)
 
 
 def _times(start: float, end: float) -> np.ndarray:

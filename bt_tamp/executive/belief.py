@@ -123,8 +123,11 @@ class Belief:
         if regions == self._regions:
             return
         self._regions = regions
-        declared = self._declared.regions
-        moved = {name: replace(declared[name], X_WR=X_WR) for name, X_WR in regions.items()}
+        declared, before = self._declared.regions, self._scenario.regions
+        moved = {
+            name: before[name] if before[name].X_WR == X_WR else replace(declared[name], X_WR=X_WR)
+            for name, X_WR in regions.items()
+        }
         self._scenario = replace(self._declared, regions={**declared, **moved})
 
     def _stays(self, observation: Observation) -> bool:

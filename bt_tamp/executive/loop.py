@@ -32,7 +32,7 @@ from planner.task.facts import place_of
 from scenarios.scenario import Scenario
 from sim.disturbance import DisturbedPlant
 from sim.plant import Command
-from sim.scene import SceneState, depth_below, floor_height
+from sim.scene import SceneState, is_on_floor
 
 STANDS = ("plan_installed", "action_started", "action_done", "action_failed")
 """Events at which it is written down how things stand: a run that is killed goes on from the last."""
@@ -51,9 +51,6 @@ BLIND_PATIENCE = 3.0
 
 REST_PATIENCE = 30.0
 """Simulated seconds that things may go on moving once the goal's literals hold."""
-
-ON_FLOOR = 0.01
-"""Metres above the floor up to which what lies nowhere else is on it."""
 
 MAX_REPLANS = 25
 MAX_ACTIONS = 200
@@ -349,10 +346,7 @@ def _place(scene: SceneState, name: str) -> str:
     """Where a body lies that isn't in the hand, in a word."""
     if name not in scene.poses:
         return "nowhere"
-    X_WO = scene.poses[name]
-    lowest = float(X_WO.translation[2]) - depth_below(scene.scenario.bodies[name].shape, X_WO.rotation)
-    is_on_floor = lowest < floor_height(scene.scenario) + ON_FLOOR
-    return place_of(scene, name) or ("floor" if is_on_floor else "elsewhere")
+    return place_of(scene, name) or ("floor" if is_on_floor(scene, name) else "elsewhere")
 
 
 def _report(recorder: RunRecorder, t: float, kind: str, data: dict[str, Any], earlier_rounds: int) -> None:

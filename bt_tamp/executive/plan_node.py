@@ -12,8 +12,9 @@ from bt_tamp.executive.rest import moving
 from planner.failure import ExecutionFailure, RefinementFailure
 from planner.refinement import Refinement, Work
 from planner.search_then_sample import NoPlan, SearchThenSample, Solution
+from planner.task.situation import Whereabouts, is_displaced, whereabouts
 from planner.task.symbols import Fact, GroundAction
-from sim.scene import SceneState, pose_distance
+from sim.scene import SceneState
 from skills.context import SkillContext
 
 COST = {"checks": 5e-6, "exact_checks": 2e-5, "ik": 1e-4, "expansions": 1e-4}
@@ -24,9 +25,6 @@ PATIENCE = 2.0
 
 LOST_PATIENCE = 15.0
 """Seconds for which the arm waits, when it can't go on, for what is nowhere to be seen to turn up again."""
-
-MOVED = 0.01
-"""Metres by which something must have moved meanwhile for a scene to be planned in again."""
 
 
 @dataclass
@@ -179,10 +177,14 @@ class PlanNode(Behaviour):
         """Is the scene, or what is wanted, no longer what was planned for? Then what was found says nothing."""
         if self._pursued != self._agenda.pursued(scene):
             return True
-        before = self._scene.poses
-        if before.keys() != scene.poses.keys():
-            return True
-        return any(pose_distance(before[name], X_WO)[0] > MOVED for name, X_WO in scene.poses.items())
+        before = self._scene
+        return any(
+            is_displaced(whereabouts(before, name), whereabouts(scene, name))
+            for name in before.poses.keys() | scene.poses.keys()
+        ) or any(
+            is_displaced(Whereabouts(before.scenario.regions[name].X_WR, False), Whereabouts(region.X_WR, False))
+            for name, region in scene.scenario.regions.items()
+        )
 
     def _is_out_of_patience(self) -> bool:
         return self._context.observation.t - self._since > LOST_PATIENCE

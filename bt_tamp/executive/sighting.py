@@ -62,14 +62,27 @@ class Sighting:
         return _mean(np.array(self._looks))
 
     def _lies_elsewhere(self) -> bool:
-        """Are the latest looks further from the earlier ones than noise explains?"""
+        """Are the latest looks further from the earlier ones, or more turned, than noise explains?"""
         if len(self._looks) <= LATEST:
             return False
-        points = np.array(self._looks)[:, :3]
-        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        deviation = median(steps.tolist()) / MEDIAN_STEP
-        off = float(np.linalg.norm(points[-LATEST:].mean(axis=0) - points[:-LATEST].mean(axis=0)))
-        return off > CERTAIN * deviation * float(np.sqrt(1.0 / LATEST + 1.0 / (len(points) - LATEST))) + JITTER
+        looks = np.array(self._looks)
+        return _is_off(looks[:, :3], JITTER) or _is_off(_turns(looks[:, 3:]), JITTER_TURN)
+
+
+def _is_off(points: np.ndarray, jitter: float) -> bool:
+    """Are the latest of some points (n,3) off the earlier ones by more than their noise and `jitter` explain?"""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    deviation = median(steps.tolist()) / MEDIAN_STEP
+    off = float(np.linalg.norm(points[-LATEST:].mean(axis=0) - points[:-LATEST].mean(axis=0)))
+    return off > CERTAIN * deviation * float(np.sqrt(1.0 / LATEST + 1.0 / (len(points) - LATEST))) + jitter
+
+
+def _turns(quaternions: np.ndarray) -> np.ndarray:
+    """Turns (n,3) in rad from the first of some quaternions xyzw (n,4), nearly: 2 sin(θ/2) about their axes."""
+    (*v, w), V, W = quaternions[0], quaternions[:, :3], quaternions[:, 3]
+    sines = w * V - W[:, None] * np.array(v) - np.cross(v, V)
+    cosines = W * w + V @ np.array(v)
+    return 2.0 * sines * np.where(cosines < 0.0, -1.0, 1.0)[:, None]
 
 
 def _mean(looks: np.ndarray) -> SE3:

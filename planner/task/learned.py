@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from planner.failure import Blocked, ExecutionFailure, RefinementFailure
+from planner.failure import ArmStopped, Blocked, ExecutionFailure, GraspSlipped, RefinementFailure
 from planner.refinement import Hints
 from planner.task.pddl import Domain
 from planner.task.primitives import achievers_of_grasps, grasping
@@ -117,6 +117,7 @@ class Learned:
         self._never: dict[GroundAction, str] = {}
         self._executed: dict[tuple[str, str], list[tuple[Any, bool]]] = {}
         self._seen: dict[str, Whereabouts | None] = {}
+        self._stood: dict[str, Whereabouts] = {}
         self._is_lenient = False
         self._forget_derived()
 
@@ -155,10 +156,15 @@ class Learned:
         situation = Situation.now(scene)
         own = situation.spot(failure.action.args[0])
         case = self._cases.setdefault((failure.action, own), Case())
-        self._keep_executed(failure.action, failure.sample, False)
-        case.samples[failure.sample] = Kept(failure.reason, None, is_executed=True)
+        # An arm that was stopped says nothing about what it was doing, one that lost its tool nothing about pressing.
+        has_lost_tool = isinstance(failure, GraspSlipped) and failure.action.name not in self._grasping
+        if not isinstance(failure, ArmStopped) and not has_lost_tool:
+            self._keep_executed(failure.action, failure.sample, False)
+        context = self._context(situation) - {own}
+        counts = not isinstance(failure, ArmStopped)
+        case.samples[failure.sample] = Kept(failure.reason, None, context, is_executed=counts)
         case.reason = failure.reason
-        self._watch(situation, {own})
+        self._watch(situation, {own} | context)
         if sum(kept.is_executed for kept in case.samples.values()) >= MAX_EXECUTION_FAILURES:
             case.has_failed = True
         return case.has_failed
@@ -234,17 +240,34 @@ class Learned:
         return self._still_there(self._binding, scene)
 
     def observe(self, scene: SceneState) -> frozenset[str]:
-        """Void what was learned of bodies that lie elsewhere now; returns their names."""
+        """Void what was learned of bodies that lie elsewhere now, and of regions that stand elsewhere; returns the
+        bodies' names."""
+        self._look_at_regions(scene)
         moved = frozenset(name for name in self._seen if self._has_moved(name, scene))
         self._drop(lambda spot: spot.left_by is None and spot.body in moved)
         for name in moved:
             del self._seen[name]
         return moved
 
+    def _look_at_regions(self, scene: SceneState) -> None:
+        stand = {name: Whereabouts(region.X_WR, False) for name, region in scene.scenario.regions.items()}
+        shifted = {name for name, now in stand.items() if is_displaced(self._stood.setdefault(name, now), now)}
+        if not shifted:
+            return
+        self._stood |= {name: stand[name] for name in shifted}
+        self._never = {action: why for action, why in self._never.items() if shifted.isdisjoint(action.args)}
+        self._cases = {key: case for key, case in self._cases.items() if shifted.isdisjoint(key[0].args)}
+        self._forget_derived()
+
     def begin(self, scene: SceneState) -> None:
-        """Void what the scene contradicts, before another plan is sought with the budgets one begins with."""
+        """Void what the scene contradicts, before another plan is sought with the budgets one begins with.
+
+        What rests on samples still stands, and is open to a wider budget again: the arm may be elsewhere now.
+        """
         self._is_lenient = False
         self.observe(scene)
+        for case in self._cases.values():
+            case.tries = 0
 
     def forget_predicted(self) -> None:
         """Drop what was learned of poses that only a plan would have brought about."""

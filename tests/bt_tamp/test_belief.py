@@ -70,6 +70,15 @@ def test_a_move_is_noticed_within_a_fifth_of_a_second_in_spite_of_noise():
     assert pose_distance(looks[-1], Y)[0] < 0.008
 
 
+def test_a_turn_on_the_spot_is_noticed_within_a_fifth_of_a_second_in_spite_of_noise():
+    rng, sighting, X = np.random.default_rng(0), Sighting(), SE3.Identity()
+    Y = SE3(pin.rpy.rpyToMatrix(0.0, 0.0, np.radians(80.0)), np.zeros(3))
+    for _ in range(60):
+        sighting.see(shaken(rng, X), True)
+    looks = [sighting.see(shaken(rng, Y), True) for _ in range(10)]
+    assert pose_distance(looks[-1], Y)[1] < np.radians(5.0)
+
+
 def test_what_is_out_of_sight_is_believed_where_it_was_and_after_a_while_nowhere(scenario):
     belief = Belief(scenario, ROBOT)
     belief.update(seen(scenario, 0.0), False)

@@ -20,7 +20,7 @@ EVENTS = [
     ),
     Event("learned", 0.1, {"action": FIRST[0], "sentence": "book cannot be grasped as it lies: drag it first"}),
     Event("proof_sought", 0.1, {"round": 2, "plan": FIRST, "expansions": 3}),
-    Event("widened", 0.1, {"tries": 40, "motion_checks": 8000}),
+    Event("widened", 0.1, {"tries": 40}),
     Event("round", 0.1, {"round": 2, "plan": SECOND, "expansions": 3}),
     Event("refined", 0.1, {"action": SECOND[0]}),
     Event("backtracked", 0.1, {"action": FIRST[0], "to": SECOND[0]}),

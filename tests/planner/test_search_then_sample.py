@@ -454,6 +454,15 @@ def test_what_lies_on_the_floor_is_proven_out_of_reach_of_any_plan(tabletop, sta
     assert not run.of("widened")
 
 
+def test_what_leans_somewhere_is_no_proof(tabletop, stand_in):
+    scene = tabletop("", "crumb")
+    leaning = scene.moved("crumb", SE3(np.eye(3), np.array([0.0, -0.7, 0.3])))
+    outcome = Run(stand_in(rule())).plan(leaning, "(in_bin crumb dustpan)")
+    assert isinstance(outcome, NoPlan)
+    assert outcome.verdict == "budget"
+    assert "crumb lies neither on the table nor in a region" in outcome.reason
+
+
 def test_a_tool_on_the_floor_is_named_where_it_is_needed(stand_in):
     start = SceneState.initial(load_scenario("fig1"), 0.1)
     fallen = start.moved("sponge", SE3(np.eye(3), np.array([0.0, -1.7, -0.6])))

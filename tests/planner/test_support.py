@@ -3,9 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from pinocchio import SE3
 
 from planner.support import borne, burden, supports
+from scenarios.shapes import Box
 from sim.scene import Held
 
 
@@ -41,3 +43,16 @@ def test_what_stands_on_what_the_hand_holds_is_borne_with_it(tabletop):
     held = replace(scene, held=Held("cup", at(0.0, 0.0, 0.0)))
     assert borne(held) == {"mug", "jug"}
     assert borne(replace(scene, held=Held("jug", at(0.0, 0.0, 0.0)))) == frozenset()
+
+
+@pytest.mark.parametrize("height", [0.012, 0.018, 0.03])
+@pytest.mark.parametrize("gap", [0.0, -0.0003])
+def test_flat_things_that_touch_side_by_side_do_not_stand_on_each_other(tabletop, height, gap):
+    scene = tabletop("cup mug")
+    bodies = {n: replace(body, shape=Box((0.1, 0.1, height))) for n, body in scene.scenario.bodies.items()}
+    scene = replace(scene, scenario=replace(scene.scenario, bodies=bodies))
+    top = scene.scenario.table.X_WT.translation[2] + scene.scenario.table.size[2] / 2
+    scene = scene.moved("cup", at(0.6, 0.0, top + height / 2)).moved("mug", at(0.6, 0.1 + gap, top + height / 2))
+    assert supports(scene, "cup") == supports(scene, "mug") == frozenset()
+    upon = scene.moved("mug", at(0.6, 0.05, top + 1.5 * height - 0.0003))
+    assert supports(upon, "mug") == {"cup"}

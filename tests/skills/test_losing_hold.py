@@ -4,13 +4,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from bench import Bench, scene_with
+from bench import Bench, action, scene_with
 from pinocchio import SE3
 from py_trees.common import Status
 
 from planner.failure import SceneChanged
+from planner.refinement import Budget, Hints
 from sim.disturbance import DisturbedPlant, Fault
-from sim.sensor_faults import ForceBias, ForceMissing
+from sim.sensor_faults import ForceBias, ForceMissing, PoseDelay
+from skills.drag import standing_out
 from skills.lift_off import LiftOff
 
 
@@ -93,3 +95,30 @@ def test_a_drag_that_drops_its_object_has_missed_its_effect():
     at_phase(bench, "retract", drop)
     assert bench.do("drag(book, table)") is Status.FAILURE
     assert bench.context.failure.kind == "EffectMissing"
+
+
+@pytest.mark.parametrize("seconds", [0.12, 0.3])
+def test_a_book_that_is_seen_late_comes_along_all_the_same_and_no_further(seconds):
+    bench = Bench(scene_with("book"))
+    bench.plant = DisturbedPlant(bench.plant, [PoseDelay(seconds=seconds)])
+    told = []
+    bench.context.report = lambda kind, **data: told.append(kind)
+    assert bench.do("drag(book, table)") is Status.SUCCESS
+    assert "pressed_harder" not in told
+    end = bench.latest.refinement.sample.end
+    scenario = bench.scene.scenario
+    out = standing_out(scenario.bodies["book"], bench.plant.truth().poses["book"], scenario.table, end.edge)
+    assert out == pytest.approx(end.overhang, abs=0.005)
+
+
+def test_a_grasp_that_failed_twice_comes_after_all_others_unless_it_has_held_since():
+    bench = Bench(scene_with("box"))
+    pick, what = bench.skills["pick"], action("pick(box, table)")
+
+    def first(**known):
+        return pick.refine(what, bench.scene, np.random.default_rng(0), Budget(), Hints(**known)).sample
+
+    best = first()
+    assert first(failed=(best,)) == best
+    assert first(failed=(best, best)) != best
+    assert first(failed=(best, best), done=(best,)) == best

@@ -8,7 +8,7 @@ import pytest
 from pinocchio import SE3
 
 import skills
-from planner.failure import Blocked, GraspSlipped, RefinementFailure
+from planner.failure import ArmStopped, Blocked, GraspSlipped, RefinementFailure
 from planner.task.learned import Learned, minimal
 from planner.task.pddl_reader import read_domain, read_text
 from planner.task.situation import Situation, Spot
@@ -244,6 +244,45 @@ def test_after_three_samples_failed_in_execution_the_action_counts_as_failed(lea
     learned.retract(1000)
     assert not learned
     assert learned.hints(PICK, Situation.now(scene))[0].avoid == {1, 2, 3}
+
+
+def test_an_arm_that_was_stopped_says_nothing_about_what_it_was_to_grasp(learned, scene):
+    for n in range(8):
+        assert not learned.learn_execution(ArmStopped(PICK, "something pushed the arm", n), scene)
+    assert learned.ungraspable(scene) == frozenset()
+    hints, _ = learned.hints(PICK, Situation.now(scene))
+    assert hints.avoid == set(range(8))
+    assert hints.failed == ()
+
+
+def test_a_tool_that_slips_time_and_again_may_be_held_otherwise(learned, scene):
+    held = replace(scene, held=Held("mug", SE3.Identity()))
+    for n in range(3):
+        learned.learn_execution(GraspSlipped(WIPE, "mug slipped", n), held)
+    assert frozenset({Spot("mug")}) in learned.constraints()[WIPE]
+    assert learned.hints(WIPE, Situation.now(held))[0].failed == ()
+    learned.observe(replace(scene, held=Held("mug", SE3(np.eye(3), np.array([0.0, 0.0, 0.04])))))
+    assert WIPE not in learned.constraints()
+
+
+def test_what_the_largest_budget_found_is_open_to_it_again_in_the_next_plan(learned, scene):
+    learned.learn(failed(PICK, set()), Situation.now(scene), (), 40)
+    learned.begin(scene)
+    assert learned.ungraspable(scene) == {"cup"}
+    learned.retract(40)
+    assert learned.ungraspable(scene) == frozenset()
+
+
+def test_what_failed_with_a_bin_is_void_once_that_stands_elsewhere(learned, scene):
+    region = scene.scenario.regions["right_bin"]
+    learned.learn(failed(PLACE, set()), Situation.now(scene), (), 20)
+    learned.learn(failed(GroundAction("place", ("mug", "right_bin")), proof="anywhere"), Situation.now(scene), (), 20)
+    learned.observe(scene)
+    assert len(learned.constraints()) == 2
+    X_WR = SE3(np.eye(3), region.X_WR.translation + np.array([0.05, 0.0, 0.0]))
+    regions = {**scene.scenario.regions, "right_bin": replace(region, X_WR=X_WR)}
+    learned.observe(replace(scene, scenario=replace(scene.scenario, regions=regions)))
+    assert learned.constraints() == {}
 
 
 def test_what_is_merely_surrounded_is_stuck_only_once_a_budget_was_widened(learned, scene):
