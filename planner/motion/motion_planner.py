@@ -23,7 +23,7 @@ from planner.motion.recent import Recent
 from planner.motion.shortcut import shortened
 from planner.motion.timing import time_line, time_path, time_path_with_stops
 from planner.motion.trajectory import Trajectory
-from planner.motion.withdrawing import HEMMED_IN, lines_back
+from planner.motion.withdrawing import HEMMED_IN, lines_back, lines_up
 from planner.motion.world import FREE_MARGIN, Margins, movables, obstacles
 from planner.refinement import Pair, Work, pairs
 from sim.robot import RobotModel
@@ -36,6 +36,9 @@ SLACK = 0.0005
 
 DEEPEST = -0.004
 """Distance in metres (negative: overlap) at which the arm may still start: things held or pressed give way a little."""
+
+TOUCHING = 0.002
+"""Metres within which what is held touches what it stands on, or leans on."""
 
 FAR_ABOUT = 1.2
 """Times the straight way: where a path is longer, another is sought, and the shorter one taken."""
@@ -207,8 +210,8 @@ class MotionPlanner:
 
         Where the arm starts nearer to something than the margin (after a grasp, beside a bin's wall), that
         pair may stay as near all the way, and hardly nearer; where it finds no way out, the hand is first drawn
-        straight back. If there is no way with everything in place, but one without the movable bodies, those in that
-        way are the culprits.
+        straight back. What is held and touches something is first raised off it, if there is room. If there is no way
+        with everything in place, but one without the movable bodies, those in that way are the culprits.
         """
         seed, ends = self._next_seed(), self.ends(scene, q_goals, allowed)
         if isinstance(ends, MotionFailure):
@@ -219,6 +222,10 @@ class MotionPlanner:
         def hopeless() -> bool:
             return walled_in() is not None or (bool(movables(scene)) and is_enclosed())
 
+        risen = self._risen(scene, q_goals, ends, seed, max_checks)
+        trajectory = None if risen is None else self._timed(scene, risen, ends.margins)
+        if trajectory is not None:
+            return trajectory
         for attempt in range(_ATTEMPTS):
             path = self._polyline(scene, ends, seed + attempt, max_checks, hopeless)
             if path is None:
@@ -304,6 +311,26 @@ class MotionPlanner:
             self.work.add("ik", len(line))
             free = not self._contacts(scene, line, ends.margins)
             path = self._polyline(replace(scene, q=line[-1]), ends, seed, max_checks) if free else None
+            if path is not None:
+                return np.concatenate([line, path[1:]])
+        return None
+
+    def _risen(
+        self, scene: SceneState, q_goals: Sequence[np.ndarray], ends: Ends, seed: int, max_checks: int
+    ) -> np.ndarray | None:
+        """A path that first raises what is held off what it touches, and keeps clear of that from there on; None if it
+        touches nothing, or there is no such path."""
+        held = frozenset({scene.held.name} if scene.held is not None else ())
+        touching = [pair for pair, distance in ends.margins.relaxed.items() if pair & held and distance < TOUCHING]
+        for line in lines_up(self.robot, scene.q) if touching else ():
+            self.work.add("ik", len(line))
+            above = replace(scene, q=line[-1])
+            onward = self.ends(above, q_goals, ends.margins.allowed)
+            if isinstance(onward, MotionFailure) or not onward.margins.relaxed.keys().isdisjoint(touching):
+                continue
+            if self._contacts(scene, line, ends.margins):
+                continue
+            path = self._polyline(above, onward, seed, max_checks)
             if path is not None:
                 return np.concatenate([line, path[1:]])
         return None

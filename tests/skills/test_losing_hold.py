@@ -11,6 +11,7 @@ from py_trees.common import Status
 from planner.failure import SceneChanged
 from planner.refinement import Budget, Hints
 from sim.disturbance import DisturbedPlant, Fault
+from sim.scene import Held
 from sim.sensor_faults import ForceBias, ForceMissing, PoseDelay
 from skills.drag import standing_out
 from skills.lift_off import LiftOff
@@ -122,3 +123,18 @@ def test_a_grasp_that_failed_twice_comes_after_all_others_unless_it_has_held_sin
     assert first(failed=(best,)) == best
     assert first(failed=(best, best)) != best
     assert first(failed=(best, best), done=(best,)) == best
+
+
+def test_what_is_held_and_still_stands_on_the_table_is_raised_first():
+    bench = Bench(scene_with("box"))
+    found = bench.refine(action("pick(box, table)"))
+    closed, grasp = found.phases[2].trajectory.end, found.sample
+    standing = replace(bench.scene, q=closed, opening=grasp.width, held=Held("box", grasp.X_OG.inverse()))
+    placed = bench.skills["place"].refine(
+        action("place(box, right_bin)"), standing, np.random.default_rng(0), Budget(), Hints()
+    )
+    carry = placed.phases[0].trajectory
+    start = standing.poses["box"].translation
+    way = [bench.robot.X_WG(carry.at(t)[0]) * standing.held.X_GO for t in np.linspace(0.0, carry.duration, 400)]
+    risen = next(X_WO.translation for X_WO in way if X_WO.translation[2] - start[2] > 0.015)
+    assert np.linalg.norm((risen - start)[:2]) < 0.01
