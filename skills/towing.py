@@ -31,8 +31,8 @@ CLOSE = 0.015
 """Metres above the object from which contact is sought slowly."""
 
 PROBE = 0.012
-TOUCH_SPEED = 0.01
-"""m/s: something rigid stops the hand within a millisecond, at 0.01 m/s with 50 N, at 0.015 m/s with 94 N."""
+TOUCH_SPEED = 0.008
+"""m/s: something rigid stops the hand within a millisecond, at 0.01 m/s with 45 to 61 N, at 0.015 m/s with 94 N."""
 
 NEAR_SPEED = 0.15
 SPEED = 0.08
