@@ -19,6 +19,9 @@ from skills.skill import Skill
 MAX_UNDONE = 1
 """How often, at most, an action whose effect isn't there right after it is simply done again."""
 
+DOUBT = 0.06
+"""Seconds for which facts must speak against a plan in the middle of an action: noise of what moves isn't averaged."""
+
 
 class Agenda:
     """What is to be done, and how far it has come.
@@ -58,6 +61,7 @@ class Agenda:
         self._running = 0
         self._sound: tuple[int, bool, frozenset[Fact]] | None = None
         self._broken: str | None = None
+        self._doubted_since: float | None = None
         self._just_done: tuple[int, ActionRun] | None = None
         self._undone: Counter[GroundAction] = Counter()
 
@@ -110,6 +114,7 @@ class Agenda:
     def adopt(self, plan: TaskPlan, refinements: tuple[Refinement, ...], context: SkillContext, why: str) -> None:
         """Put a new plan in force: the old tree is stopped, then replaced."""
         self.plan, self._refinements, self._sound, self._broken = plan, refinements, None, None
+        self._doubted_since = None
         self.has_begun, self._released = True, frozenset()
         self._build_from(0, context, why)
 
@@ -137,12 +142,17 @@ class Agenda:
             return self._what_changed(context.scene)
         facts = self.facts(context.scene)
         if (self._running, self.is_between_actions, facts) == self._sound:
+            self._doubted_since = None
             return None
         if not self.is_between_actions:
-            if not still_good_while(plan, self._running, facts):
-                return f"after {self.running} the rest of the plan would no longer apply"
-            self._sound = self._running, False, facts
-            return None
+            if still_good_while(plan, self._running, facts):
+                self._sound, self._doubted_since = (self._running, False, facts), None
+                return None
+            now = context.observation.t
+            self._doubted_since = now if self._doubted_since is None else self._doubted_since
+            is_certain = now - self._doubted_since >= DOUBT
+            return f"after {self.running} the rest of the plan would no longer apply" if is_certain else None
+        self._doubted_since = None
         k = resume_at(plan, facts)
         missing = self._missing_effect(plan, k, facts)
         if missing is not None:

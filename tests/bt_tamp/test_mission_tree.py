@@ -260,15 +260,33 @@ def test_a_plan_that_was_found_wanting_stays_out_of_force_even_if_it_comes_good_
     assert world.log[stopped] == "plan"
 
 
+def test_what_only_a_blink_speaks_against_is_gone_on_with():
+    world, needed = World(), Fact("needed")
+    first, second, third = ROUTE.steps
+    second = Step(second.action, second.preconditions | {needed}, second.adds, second.deletes)
+    world.route = TaskPlan((first, second, third), ROUTE.goal)
+    world.facts, world.ticks = world.facts | {needed}, 9
+    while "begin a" not in world.log:
+        world.tick()
+    world.facts -= {needed}
+    world.tick(2)
+    world.facts |= {needed}
+    world.until_done()
+    assert world.log.count("plan") == 1
+    assert "stopped a" not in world.log
+
+
 def test_a_plan_whose_rest_no_longer_applies_is_replaced_and_the_old_tree_is_stopped_first():
     world = World()
+    world.ticks = 20
     while "begin a" not in world.log:
         world.tick()
     never = Fact("never")
     step = world.agenda.plan.steps[1]
     broken = Step(step.action, step.preconditions | {never}, step.adds, step.deletes)
     world.agenda.plan = TaskPlan((world.agenda.plan.steps[0], broken, world.agenda.plan.steps[2]), ROUTE.goal)
-    world.tick()
+    while world.log.count("plan") < 2:
+        world.tick()
     assert world.log[-3:] == ["plan", "stopped a", "begin a"]
 
 
