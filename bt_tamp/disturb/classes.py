@@ -223,8 +223,12 @@ KINDS: dict[str, Kind] = {
     "joint-delay": Kind(partial(disordered, what="joint-delay", size=0.01, seconds=2.0), _driven, False),
     "joint-friction": Kind(partial(disordered, what="joint-friction", size=3.0)),
     "pose-noise": Kind(partial(disordered, what="pose-noise", size=0.005)),
-    "pose-delay": Kind(partial(moved_unseen, what="pose-delay", size=0.3, seconds=FOREVER, within=(0.5, 2.0))),
-    "pose-missing": Kind(partial(moved_unseen, what="pose-missing", size=0.0, seconds=1.0, within=(0.2, 0.8))),
+    "pose-delay": Kind(
+        partial(moved_unseen, what="pose-delay", size=0.3, seconds=FOREVER, within=(0.5, 2.0)), _before_last
+    ),
+    "pose-missing": Kind(
+        partial(moved_unseen, what="pose-missing", size=0.0, seconds=1.0, within=(0.2, 0.8)), _before_last
+    ),
     "qp-infeasible": Kind(seams=partial(_failing_solver, "primal infeasible")),
     "qp-iterations": Kind(seams=partial(_failing_solver, "maximum iterations reached")),
     "motion-budget": Kind(seams=_exhausted_motion_planner),

@@ -87,6 +87,8 @@ def action(text):
         ("sponge-far", ("pick(book, table)", "place(book, right_bin)"), False),
         ("moved", ("pick(sponge, dustpan)", "wipe(carrot, table)"), True),
         ("moved", ("pick(sponge, dustpan)", "place(sponge, left_bin)"), False),
+        ("pose-delay", ("pick(sponge, dustpan)", "wipe(carrot, table)"), True),
+        ("pose-missing", ("pick(sponge, dustpan)", "place(sponge, left_bin)"), False),
         ("taken-and-returned", ("pick(sponge, dustpan)", "place(sponge, left_bin)"), False),
         ("bin-shifted", ("wipe(carrot, table, dustpan)", "place(sponge, left_bin)"), True),
         ("bin-shifted", ("wipe(carrot, table, dustpan)", "place(sponge, table)"), False),
