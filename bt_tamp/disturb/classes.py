@@ -104,6 +104,11 @@ def _before_last(to_come: Prospect) -> bool:
     return bool(names - ({held.name} if held is not None else set()))
 
 
+def _before_another(to_come: Prospect) -> bool:
+    """Will something be dealt with on the table after this, even what is being dragged over it now?"""
+    return any(action.name != "place" and action.args[1:2] == (TABLE,) for action in _ahead(to_come))
+
+
 def _before_needed_tool(to_come: Prospect) -> bool:
     """Is a tool itself wanted somewhere, or still to be wiped with?"""
     bodies = to_come.scenario.bodies
@@ -224,10 +229,10 @@ KINDS: dict[str, Kind] = {
     "joint-friction": Kind(partial(disordered, what="joint-friction", size=3.0)),
     "pose-noise": Kind(partial(disordered, what="pose-noise", size=0.005)),
     "pose-delay": Kind(
-        partial(moved_unseen, what="pose-delay", size=0.3, seconds=FOREVER, within=(0.5, 2.0)), _before_last
+        partial(moved_unseen, what="pose-delay", size=0.3, seconds=FOREVER, within=(0.5, 2.0)), _before_another
     ),
     "pose-missing": Kind(
-        partial(moved_unseen, what="pose-missing", size=0.0, seconds=1.0, within=(0.2, 0.8)), _before_last
+        partial(moved_unseen, what="pose-missing", size=0.0, seconds=1.0, within=(0.2, 0.8)), _before_another
     ),
     "qp-infeasible": Kind(seams=partial(_failing_solver, "primal infeasible")),
     "qp-iterations": Kind(seams=partial(_failing_solver, "maximum iterations reached")),
