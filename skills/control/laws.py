@@ -22,8 +22,8 @@ LANDING = 0.12
 APPROACH_LIMIT = 0.06
 """Metres per second towards the surface that the QP allows while contact is sought or kept."""
 
-YIELDING, YIELDING_DAMPING = 100.0, 30.0
-"""1/s² and 1/s with which the arm holds after a collision: it gives way."""
+YIELDING, YIELDING_DAMPING = 300.0, 70.0
+"""1/s² and 1/s with which the arm holds after a collision: it gives way, but isn't flung at what stands beside it."""
 
 Joints = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Where the joints should be: position, velocity and acceleration (7,)."""
