@@ -17,6 +17,10 @@ SHIFT = 0.008
 TURN = np.radians(6.0)
 """How far an object may move before what was refined for it no longer fits."""
 
+IN_HAND = 0.01
+IN_HAND_TURN = np.radians(7.0)
+"""How far what is held may shift and turn in the hand before a motion that carries it no longer fits."""
+
 STIR = 0.002
 STIR_TURN = np.radians(2.0)
 """How far a body may move before the path is looked at again."""
@@ -36,7 +40,7 @@ class Watch:
         self._load = Load(self._objects, scene)
 
     def object_shifted(self, scene: SceneState) -> str | None:
-        """Which of the action's objects no longer lies as it was refined for, in a sentence."""
+        """Which of the action's objects no longer lies, or is no longer held, as it was refined for, in a sentence."""
         for name in self._objects:
             if name not in scene.poses:
                 return f"{name} is gone"
@@ -45,7 +49,14 @@ class Watch:
         for name in self._places:
             if scene.scenario.regions[name] is not self._regions[name]:
                 return f"{name} was moved"
-        return self._load.come(scene)
+        return self._shifted_in_hand(scene) or self._load.come(scene)
+
+    def _shifted_in_hand(self, scene: SceneState) -> str | None:
+        before, held = self._refined.held, scene.held
+        if before is None or held is None or held.name != before.name:
+            return None
+        has_shifted = _has_moved(before.X_GO, held.X_GO, IN_HAND, IN_HAND_TURN)
+        return f"{held.name} shifted in the hand" if has_shifted else None
 
     def path_blocked(self, scene: SceneState, phase: Phase, since: float) -> MotionFailure | None:
         """What is in the way of the rest of a phase, `since` seconds after its start, and of the moves after it.

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from bench import Bench, action, scene_with, with_pose
 from pinocchio import SE3
@@ -17,8 +18,10 @@ from planner.support import supports
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, extents
+from sim.scene import Held
 from skills.context import ActionRun
 from skills.control.controller import AT_REST
+from skills.watching import Watch
 
 
 def carried_out(bench: Bench, text: str, phase: str, share: float, disturb: Callable[[], None]) -> Status:
@@ -184,6 +187,19 @@ def test_what_is_put_in_the_way_of_the_hand_is_gone_around_without_touching_it()
     assert place_of(bench.scene, "sponge") == "left_bin"
     assert any(kind == "refined_again" and "box" in reason for kind, reason in told)
     assert np.linalg.norm(bench.scene.poses["box"].translation - spot.translation) < 0.002
+
+
+@pytest.mark.parametrize(("by", "turn", "is_told"), [(0.004, 3.0, False), (0.013, 0.0, True), (0.0, 9.6, True)])
+def test_what_shifts_in_the_hand_is_carried_another_way(by, turn, is_told):
+    bench = Bench(scene_with("box"))
+    assert bench.do("pick(box, table)") is Status.SUCCESS
+    placed = bench.refine(action("place(box, right_bin)"))
+    assert isinstance(placed, Refinement)
+    watch, held = Watch(bench.motion, placed, bench.scene), bench.scene.held
+    assert watch.object_shifted(bench.scene) is None
+    slip = SE3(pin.rpy.rpyToMatrix(0.0, np.radians(turn), 0.0), np.array([0.0, 0.0, by]))
+    shifted = replace(bench.scene, held=Held("box", held.X_GO * slip))
+    assert watch.object_shifted(shifted) == ("box shifted in the hand" if is_told else None)
 
 
 def test_what_is_put_in_the_way_of_a_stroke_ends_it_before_it_is_hit():
