@@ -15,8 +15,8 @@ DURATION = 1.0
 PATIENCE = 2.0
 """Seconds after which the arm counts as stopped, wherever it is."""
 
-GIVING_WAY = 0.3
-"""Seconds for which an arm that was stopped by a push goes on giving way, before it holds stiffly again."""
+UNBORNE = 0.3
+"""Seconds for which an arm that was stopped by a push bears only what it bore before, then all that weighs on it."""
 
 STEPS = 25
 DAMPING = 1e-3
@@ -52,7 +52,7 @@ class LiftOff(Behaviour):
             if waited > 0.0:
                 self._begin()
             return Status.RUNNING
-        if controller.stopped is not None and waited > GIVING_WAY:
+        if controller.stopped is not None and waited > UNBORNE:
             controller.acknowledge()
         return Status.SUCCESS if controller.finished or waited > PATIENCE else Status.RUNNING
 

@@ -16,7 +16,7 @@ from skills.control.contact import ContactWrench, Touch, along
 from skills.control.cushion import cushion
 from skills.control.dynamics import Dynamics
 from skills.control.force import ForceLoop
-from skills.control.laws import Law, comply, give_way, lowered, press, seek, track
+from skills.control.laws import Law, comply, lowered, press, seek, track
 from skills.control.momentum import Compensation, MomentumObserver
 from skills.control.osqp_ import Solver
 from skills.control.reference import Course, Reference, near_contact
@@ -129,7 +129,7 @@ class ArmController:
         self._pending, self._hold_pending = None, True
 
     def acknowledge(self) -> None:
-        """Take note of a stop: hold stiffly again, from where the arm is now."""
+        """Take note of a stop: hold where the arm is now, bearing whatever weighs on it."""
         if self.stopped is not None:
             self.stopped = self._unexplained = None
             self._guard.reset()
@@ -312,7 +312,7 @@ class ArmController:
         self.stopped = reason
         self._begin_hold(state)
         if isinstance(reason, Collision | ForceTooHigh):
-            # Rest here and give way, bearing only what had to be borne before.
+            # Hold here, bearing only what had to be borne before: what pushes isn't pushed back against.
             self._course = Course(Trajectory.standstill(state.q))
             self._unexplained = self._observer.unmodelled - self._observer.sudden
 
@@ -363,8 +363,6 @@ class ArmController:
     def _law(self) -> Law:
         """What is asked for at this instant."""
         reference, joints = self._reference, self._course.now()
-        if self._unexplained is not None:
-            return give_way(joints)
         if reference is None or reference.mode == "position":
             return track(joints)
         if reference.mode == "hybrid" and not self._pressed:

@@ -1,4 +1,4 @@
-"""What keeps an arm that gives way from being flung about: what pushes it is not in the model, and whatever the QP
+"""What keeps an arm that is pushed from being flung about: what pushes it is not in the model, and whatever the QP
 allows for the joints' limits, a push on the hand would drive them beyond their speeds and onto their stops."""
 
 import numpy as np

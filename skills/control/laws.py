@@ -22,9 +22,6 @@ LANDING = 0.12
 APPROACH_LIMIT = 0.06
 """Metres per second towards the surface that the QP allows while contact is sought or kept."""
 
-YIELDING, YIELDING_DAMPING = 300.0, 70.0
-"""1/s² and 1/s with which the arm holds after a collision: it gives way, but isn't flung at what stands beside it."""
-
 Joints = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Where the joints should be: position, velocity and acceleration (7,)."""
 
@@ -40,11 +37,6 @@ class Law(NamedTuple):
 def track(joints: Joints) -> Law:
     """Follow stiffly in joint space."""
     return Law([JointTask(*joints)], _NO_WRENCH)
-
-
-def give_way(joints: Joints) -> Law:
-    """Hold softly."""
-    return Law([JointTask(*joints, YIELDING_DAMPING, YIELDING)], _NO_WRENCH)
 
 
 def seek(joints: Joints, reference: Reference) -> Law:
