@@ -250,12 +250,13 @@ class BulletPlant:
     def set_joint_friction(self, torque: np.ndarray) -> None:
         """From now on the arm's joints rub with Coulomb friction of `torque` (7,) Nm: the engine's own joint motors
         hold the joints still with at most as much, so a joint sticks as well as slides."""
+        self.joint_friction = np.array(torque, dtype=float)
         p.setJointMotorControlArray(
             self._robot,
             self._arm_joints,
             p.VELOCITY_CONTROL,
             targetVelocities=[0.0] * 7,
-            forces=[float(t) for t in torque],
+            forces=self.joint_friction.tolist(),
             physicsClientId=self._client,
         )
 
@@ -368,9 +369,7 @@ class BulletPlant:
         self.set_pad_friction(None)
         for finger in self._finger_joints:
             p.changeDynamics(self._robot, finger, spinningFriction=PAD_RESISTANCE, physicsClientId=self._client)
-        p.setJointMotorControlArray(
-            self._robot, self._arm_joints, p.VELOCITY_CONTROL, forces=[0.0] * 7, physicsClientId=self._client
-        )
+        self.set_joint_friction(np.zeros(7))
         for joint, angle in zip(self._arm_joints, scenario.robot.q0, strict=True):
             p.resetJointState(self._robot, joint, float(angle), physicsClientId=self._client)
         for finger in self._finger_joints:

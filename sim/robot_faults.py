@@ -11,18 +11,19 @@ from sim.plant import Command, GripCommand
 
 @dataclass(frozen=True)
 class JointFriction(Fault):
-    """Coulomb friction in the arm's joints, in Nm: at rest it holds against as much, moving it brakes with as much."""
+    """Coulomb friction in the arm's joints, in Nm: at rest it holds against as much, moving it brakes with as much.
+    What rubs at the same time adds up."""
 
     torque: tuple[float, ...]
 
     def begin(self, plant: BulletPlant) -> None:
-        plant.set_joint_friction(np.array(self.torque))
+        plant.set_joint_friction(plant.joint_friction + self.torque)
 
     def act(self, plant: BulletPlant) -> None:
         """Nothing more while it lasts."""
 
     def cease(self, plant: BulletPlant) -> None:
-        plant.set_joint_friction(np.zeros(7))
+        plant.set_joint_friction(np.maximum(plant.joint_friction - self.torque, 0.0))
 
 
 @dataclass(frozen=True)

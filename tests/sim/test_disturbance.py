@@ -181,6 +181,14 @@ def test_friction_in_the_joints_is_not_felt_at_the_wrist_and_ends_with_its_fault
     assert afterwards[-1].v[6] > 1.0
 
 
+def test_what_rubs_at_the_same_time_adds_up_and_the_rest_goes_on_rubbing(make):
+    twist = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])
+    both = watched(make(JointFriction((1.0,) * 7, end=0.02), JointFriction((1.0,) * 7)), 0.04, twist)
+    assert abs(both[19].v[6]) < 1e-6
+    one = watched(make(JointFriction((1.0,) * 7)), 0.02, twist)
+    assert both[-1].v[6] == pytest.approx(one[-1].v[6], rel=0.1)
+
+
 def test_an_arm_heavier_than_its_model_sags_and_its_hand_weighs_more(make):
     locked = JointFriction((500.0,) * 7, end=0.02)
     plain, heavy = make(locked), make(locked)
