@@ -68,3 +68,10 @@ objects:"""
     assert code in (10, 11)
     assert result["goal"] == {"in_bin(can, covered)": False, "in_bin(jar, crate)": True}
     assert result["reason"].endswith("; the rest is done")
+
+
+def test_no_verdict_is_given_on_what_has_changed_while_it_was_thought_over(tmp_path):
+    far = SCENE.replace("[0.05, -0.62, -0.145]", "[0.05, -2.62, -0.145]")
+    shift = "{at: 1.0, shift: {region: crate, by: [0, 2.0, 0]}}"
+    (tmp_path / "far.yaml").write_text(far.replace("{at: 0.6, move: {object: can, by: [2.5, 0, -0.2]}}", shift))
+    assert main(["run", str(tmp_path / "far.yaml"), "--out", str(tmp_path / "run")]) == 0
