@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from planner.failure import EffectMissing, GraspSlipped, SceneChanged
 from planner.task.facts import place_of
-from sim.scene import Held, SceneState, pose_distance
+from sim.scene import Held, SceneState, is_on_floor, pose_distance
 from skills.context import ActionRun, SkillContext
 from skills.watching import Load
 
@@ -120,10 +120,19 @@ class Achieved(Behaviour):
         if context.observation.t - self._since < EFFECT_TIME:
             return Status.RUNNING
         name = action.args[0]
-        held = context.scene.held is not None and context.scene.held.name == name
-        where = "in the hand" if held else place_of(context.scene, name) or "nowhere"
         sample = self._run.refinement.sample if self._run.refinement else None
-        reason = f"{name} did not come to where it should be: {where}"
+        reason = f"{name} did not come to where it should, it is {_whereabouts(context.scene, name)}"
         context.fail(EffectMissing(action, reason, sample))
         self.feedback_message = reason
         return Status.FAILURE
+
+
+def _whereabouts(scene: SceneState, name: str) -> str:
+    if scene.held is not None and scene.held.name == name:
+        return "in the hand"
+    if name not in scene.poses:
+        return "nowhere to be seen"
+    place = place_of(scene, name)
+    if place is None:
+        return "on the floor" if is_on_floor(scene, name) else "in none of the known places"
+    return "on the table" if place == "table" else f"in {place}"

@@ -96,6 +96,7 @@ def test_a_drag_that_drops_its_object_has_missed_its_effect():
     at_phase(bench, "retract", drop)
     assert bench.do("drag(book, table)") is Status.FAILURE
     assert bench.context.failure.kind == "EffectMissing"
+    assert bench.context.failure.reason == "book did not come to where it should, it is on the floor"
 
 
 @pytest.mark.parametrize("seconds", [0.12, 0.3])

@@ -110,6 +110,7 @@ def test_what_was_missed_is_wiped_again():
     bench.run = put_behind
     assert bench.do("wipe(carrot, table, dustpan)") is Status.FAILURE
     assert isinstance(bench.context.failure, EffectMissing)
+    assert bench.context.failure.reason.endswith("it is on the table")
     bench.context.failure = None
     assert bench.do("wipe(carrot, table, dustpan)") is Status.SUCCESS
     assert place_of(bench.scene, "carrot") == "dustpan"
