@@ -72,7 +72,7 @@ def urdf_path(model: str) -> Path:
 class RobotModel:
     """Kinematics and dynamics of the arm with its hand, standing at X_WB.
 
-    q_min, q_max (7,) rad; v_max (7,) rad/s; a_max (7,) rad/s²; tau_max (7,) Nm.
+    q_min, q_max (7,) rad; v_max (7,) rad/s; a_max (7,) rad/s²; tau_max (7,) Nm; tcp_speed_max m/s of the tool centre.
     """
 
     links = (*(f"link_{i}" for i in range(8)), "hand", "finger_left", "finger_right")
@@ -98,6 +98,7 @@ class RobotModel:
         self.v_max = arm.velocityLimit.copy()
         self.tau_max = arm.effortLimit.copy()
         self.a_max = np.array([6.0, 6.0, 8.0, 8.0, 10.0, 12.0, 12.0])
+        self.tcp_speed_max = 2.5
         self.tcp_id = arm.getFrameId("tcp")
         self.flange_id = arm.getFrameId("hand")
         self._data = arm.createData()

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline
 
-from planner.motion.chain import tcp_path
+from planner.motion.chain import tcp_path, tcp_speeds
 from planner.motion.topp import fastest_rates
 from planner.motion.trajectory import Trajectory
 from sim.robot import RobotModel
@@ -17,10 +17,14 @@ CONTROL_SPACING = 0.3
 SPEED = 0.9
 """Part of the joints' velocity and acceleration limits that is used."""
 
+TCP_SPEED = 0.8
+"""Part of the hand's limit of speed that free motions use: near it, the arm stops."""
+
 TCP_ACCELERATION = 0.5
 """Default acceleration of the hand along lines, m/s²."""
 
 _SAMPLE = 0.02
+_SLOW = 1e-6
 _GRID_STEP = 0.05
 _GRID_SIZE = (20, 80)
 _RADIUS = 0.25
@@ -32,7 +36,8 @@ _PEAK = 1.875
 
 
 def time_path(robot: RobotModel, waypoints: np.ndarray, spacing: float = CONTROL_SPACING) -> Trajectory:
-    """The fastest motion along a smooth curve close to the polyline (n,7), from rest to rest, at SPEED of the limits.
+    """The fastest motion along a smooth curve close to the polyline (n,7), from rest to rest, at SPEED of the joints'
+    limits, the hand at no more than TCP_SPEED of its own.
 
     The curve is a cubic B-spline with its control points on the polyline, at most `spacing` rad apart: it
     stays on straight stretches and cuts corners on the inside, by less than a third of the spacing.
@@ -42,7 +47,9 @@ def time_path(robot: RobotModel, waypoints: np.ndarray, spacing: float = CONTROL
         return Trajectory.standstill(waypoints[0])
     end = float(curve.t[-1])
     grid = np.linspace(0.0, end, int(np.clip(length / _GRID_STEP, *_GRID_SIZE)) + 1)
-    rate = fastest_rates(grid, curve(grid, 1), curve(grid, 2), SPEED * robot.v_max, SPEED * robot.a_max)
+    d1 = curve(grid, 1)
+    fastest = TCP_SPEED * robot.tcp_speed_max / np.maximum(tcp_speeds(robot, curve(grid), d1), _SLOW)
+    rate = fastest_rates(grid, d1, curve(grid, 2), SPEED * robot.v_max, SPEED * robot.a_max, fastest)
     # The path's acceleration is constant between grid points and jumps there, so each gets a knot.
     durations = 2 * np.diff(grid) / (rate[1:] + rate[:-1])
     pieces = np.ceil(durations / _SAMPLE).astype(int)

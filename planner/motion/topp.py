@@ -33,15 +33,16 @@ def _accelerations(x, i, step, d1, d2, a_max, x_next):
 
 
 @njit(cache=True)
-def fastest_rates(grid, d1, d2, v_max, a_max):
+def fastest_rates(grid, d1, d2, v_max, a_max, most):
     """Highest rates ṡ (n,) from rest to rest at the grid points s (n,), rising.
 
     d1, d2 (n,7): first and second derivative of the path by s at the grid points. v_max, a_max (7,): limits.
+    most (n,): what else bounds the rate at each grid point.
     """
     n = grid.shape[0]
     bound = np.empty(n)
     for i in range(n):
-        bound[i] = np.inf
+        bound[i] = most[i] ** 2
         for j in range(d1.shape[1]):
             speed = abs(d1[i, j])
             if speed > 1e-12:

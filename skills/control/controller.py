@@ -93,7 +93,7 @@ class ArmController:
         self.lap: Callable[[str], None] = nobody
         self._qp = TorqueQP(robot, period, lambda part: self.lap(part), solver)
         self._observer = MomentumObserver(period)
-        self._guard = Guard(safety or SafetyLimits(), robot.tau_max, period)
+        self._guard = Guard(safety or SafetyLimits(speed=robot.tcp_speed_max), robot.tau_max, period)
         self._compensation = Compensation(robot.tau_max, period)
         self._wrench = ContactWrench(robot, period)
         self._touch = Touch(period)

@@ -1,13 +1,16 @@
 from itertools import pairwise
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from scipy.interpolate import CubicSpline
 
+from planner.motion.chain import tcp_speeds
 from planner.motion.lines import interpolate
-from planner.motion.timing import SPEED, joined, time_line, time_path, time_path_with_stops
+from planner.motion.timing import SPEED, TCP_SPEED, joined, time_line, time_path, time_path_with_stops
 from planner.motion.topp import fastest_rates
 from planner.motion.trajectory import Trajectory
+from sim.robot import RobotModel
 
 START = np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 80.0, 0.0])
 
@@ -21,6 +24,10 @@ def _motion(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     samples = [trajectory.at(t) for t in np.linspace(1e-9, trajectory.duration - 1e-9, 1500)]
     q, v, a = (np.array(column) for column in zip(*samples, strict=True))
     return q, v, a
+
+
+def _jacobian(robot: RobotModel, q: np.ndarray) -> np.ndarray:
+    return pin.computeFrameJacobian(robot.model, robot.data(), q, robot.tcp_id, pin.LOCAL_WORLD_ALIGNED)[:3]
 
 
 def _distance_to_polyline(q: np.ndarray, waypoints: np.ndarray) -> float:
@@ -39,6 +46,22 @@ def test_a_timed_path_keeps_the_limits_and_uses_them(robot, seed):
     assert np.all(np.abs(a) <= robot.a_max * (1 + 1e-9))
     used = max(np.max(np.abs(v) / robot.v_max), np.max(np.abs(a) / robot.a_max))
     assert used > 0.8
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_hand_of_a_stretched_arm_keeps_below_its_own_limit(robot, seed):
+    middle = np.array([0.0, 0.3, 0.0, -0.2, 0.0, 0.1, 0.0]) + np.random.default_rng(seed).normal(size=7) * 0.05
+    swing = np.array([0.0, 1.6, 0.0, -1.6, 0.0, 1.6, 0.0])
+    trajectory = time_path(robot, np.stack([middle - swing / 2, middle + swing / 2]))
+    speeds = [np.linalg.norm(_jacobian(robot, at) @ rate) for at, rate, _ in zip(*_motion(trajectory), strict=True)]
+    assert max(speeds) == pytest.approx(TCP_SPEED * robot.tcp_speed_max, rel=0.02)
+
+
+def test_the_hand_s_speeds_are_those_of_pinocchio_s_jacobian(robot):
+    rng = np.random.default_rng(0)
+    q, v = rng.uniform(robot.q_min, robot.q_max, (20, 7)), rng.normal(size=(20, 7))
+    expected = [np.linalg.norm(_jacobian(robot, at) @ rate) for at, rate in zip(q, v, strict=True)]
+    assert np.allclose(tcp_speeds(robot, q, v), expected)
 
 
 def test_a_timed_path_starts_and_ends_at_rest_at_its_ends(robot):
@@ -87,7 +110,7 @@ def test_the_rates_are_those_that_toppra_finds(robot):
         grid = np.linspace(0.0, way[-1], 61)
         path = toppra.SplineInterpolator(way, knots, bc_type="natural")
         _, expected, _ = TOPPRA(limits, path, gridpoints=grid, solver_wrapper="seidel").compute_parameterization(0, 0)
-        rates = fastest_rates(grid, spline(grid, 1), spline(grid, 2), robot.v_max, robot.a_max)
+        rates = fastest_rates(grid, spline(grid, 1), spline(grid, 2), robot.v_max, robot.a_max, np.full(61, np.inf))
         assert np.allclose(rates, expected, atol=2e-3)
         ours, theirs = (float(np.sum(2 * np.diff(grid) / (r[1:] + r[:-1]))) for r in (rates, expected))
         assert ours / theirs == pytest.approx(1.0, abs=1e-3)
