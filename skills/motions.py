@@ -167,7 +167,9 @@ class Close(PhaseLeaf):
             return Status.RUNNING
         name = self._run.action.args[0]
         if context.scene.held is None or context.scene.held.name != name:
-            return self.refuse(GraspMissed, f"the fingers closed to {max(observation.opening, 0.0) * 1000:.0f} mm without {name}")
+            return self.refuse(
+                GraspMissed, f"the fingers closed to {observation.opening * 1000:z.0f} mm without {name}"
+            )
         context.controller.set_payload(*load_of(context.scene, name))
         return Status.SUCCESS
 

@@ -18,6 +18,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from bt_tamp.sweep_results import Line, Run
 
+SHOWN = 3
+"""Commands that are printed of runs that failed alike."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Store and folder."""
@@ -39,9 +42,11 @@ def call(arguments: argparse.Namespace) -> int:
         found = lines(runs, arguments.together)
     if not runs:
         raise UserError(f"{arguments.store}: holds no runs")
+    made = [] if arguments.out is None else _export(arguments.out, found, runs)
     _print(found, runs)
-    if arguments.out is not None:
-        _export(arguments.out, found, runs)
+    _print_failures(runs)
+    for path in made:
+        print(path)
     return 0
 
 
@@ -83,16 +88,30 @@ def _print(found: "list[Line]", runs: "list[Run]") -> None:
         console.print(Text("phases hit: " + ", ".join(f"{what} {n}" for what, n in struck.most_common())))
     for told in totals(runs):
         console.print(told, highlight=False)
-    for run in (run for run in runs if run.is_met and not run.succeeded):
-        said = f"{run.outcome.replace('_', ' ')}{': ' if run.reason else ''}{run.reason}"
-        console.print(Text(f"{run.command}\n    {said}"), soft_wrap=True)
+
+
+def _print_failures(runs: "list[Run]") -> None:
+    from rich.text import Text
+
+    from bt_tamp.sweep_failures import OPEN_LOOP, kinds_of_failure
+    from bt_tamp.sweep_table import table_console
+
+    console = table_console()
+    for kind in kinds_of_failure(runs):
+        way = "watching" if kind.replan else "open loop"
+        console.print(Text(f"\n{way}, {len(kind.runs)} × {kind.why}"), soft_wrap=True)
+        for run in kind.runs[:SHOWN]:
+            reason = run.reason.removeprefix(OPEN_LOOP)
+            console.print(Text(f"    {run.command}\n        {reason}"), soft_wrap=True)
+        if len(kind.runs) > SHOWN:
+            print(f"    and {len(kind.runs) - SHOWN} more: --out DIR writes the commands of all to runs.csv")
 
 
 def _shown(value: float | None) -> str:
     return "–" if value is None else f"{value:z.1f}"
 
 
-def _export(folder: Path, found: "list[Line]", runs: "list[Run]") -> None:
+def _export(folder: Path, found: "list[Line]", runs: "list[Run]") -> list[Path]:
     from bt_tamp.errors import refusing
     from bt_tamp.sweep_export import plot, write_csv
 
@@ -103,5 +122,4 @@ def _export(folder: Path, found: "list[Line]", runs: "list[Run]") -> None:
             made += plot(folder, found)
         except ImportError:
             print("bt-tamp: no plots: they need matplotlib (pip install bt-tamp[plots])", file=sys.stderr)
-    for path in made:
-        print(path)
+    return made

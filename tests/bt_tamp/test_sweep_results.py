@@ -200,13 +200,29 @@ def test_runs_of_all_scenes_come_together_in_one_line_a_class_and_in_one_sentenc
 def test_the_table_is_printed_and_written(store, tmp_path, capsys):
     assert main(["results", str(store), "--out", str(tmp_path / "out")]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "bt-tamp run fig2 --seed 2 --disturb moved gave up: 25 plans were made" in said
+    assert "watching, 1 × gave up: … plans were made bt-tamp run fig2 --seed 2 --disturb moved 25 plans were" in said
+    assert "open loop, 1 × gave up: it failed bt-tamp run fig2 --seed 0 --disturb moved --no-replan it failed" in said
     assert "phases hit: pick approach 6" in said
     assert (tmp_path / "out" / "fig2.png").read_bytes().startswith(b"\x89PNG")
     with (tmp_path / "out" / "runs.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 9
     assert {row["succeeded"] for row in rows} == {"True", "False"}
+
+
+def test_runs_that_failed_alike_are_told_together_with_the_first_commands(store, tmp_path, capsys):
+    with SweepStore(store) as opened:
+        for seed in range(5):
+            reason = f"open loop: pick(cup_{seed}, table) failed: the fingers closed to {seed} mm without cup_{seed}"
+            done = finished(seed, 8.0, ("rotated",), "gave_up", reason, replan=False)
+            result = json.loads(done.result or "") | {"places": {f"cup_{seed}": "table"}}
+            opened.add(replace(done, result=json.dumps(result)))
+    assert main(["results", str(store), "--out", str(tmp_path)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "open loop, 5 × gave up: pick failed: the fingers closed to … mm without a body bt-tamp run" in said
+    assert said.count("--disturb rotated --no-replan pick(cup_") == 3
+    assert "and 2 more" in said
+    assert (tmp_path / "runs.csv").read_text().count("--disturb rotated --no-replan") == 5
 
 
 def test_a_store_that_is_not_there_is_refused(tmp_path, capsys):
