@@ -6,6 +6,7 @@ Each check yields problems as (key path, message), in the file's order.
 from collections.abc import Iterator
 
 import numpy as np
+from pinocchio import SE3
 
 from scenarios import schema
 from scenarios.document import KeyPath
@@ -64,21 +65,24 @@ def surface_problems(file: schema.SceneFile, scenario: Scenario) -> Iterator[Pro
         for name, thing in getattr(file, group).items():
             if not isinstance(thing.pose, PoseOn):
                 continue
-            on = thing.pose.on
-            if on == TABLE:
-                half = np.array(scenario.table.size) / 2
-                X_WS, lower, upper = scenario.table.X_WT, -half, half
-            else:
-                X_WS = scenario.regions[on].X_WR
-                lower, upper = interior(scenario.regions[on])
-            p_SO = X_WS.actInv(placed[name].X_WO.translation)
-            if np.any(p_SO[:2] < lower[:2]) or np.any(p_SO[:2] > upper[:2]):
-                limits = " and ".join(f"{a} {lower[i]:.3f} to {upper[i]:.3f}" for i, a in enumerate("xy"))
-                at = f"{p_SO[0]:.3f}, {p_SO[1]:.3f}"
-                yield (
-                    (group, name, "pose", "xy"),
-                    f"lies off {on!r}: at ({at}) from its centre, expected {limits} m",
-                )
+            problem = lies_off(scenario, thing.pose.on, placed[name].X_WO)
+            if problem is not None:
+                yield (group, name, "pose", "xy"), problem
+
+
+def lies_off(scenario: Scenario, on: str, X_WO: SE3) -> str | None:
+    """In what way a pose X_WO on a surface lies beside it, or None."""
+    if on == TABLE:
+        half = np.array(scenario.table.size) / 2
+        X_WS, lower, upper = scenario.table.X_WT, -half, half
+    else:
+        X_WS = scenario.regions[on].X_WR
+        lower, upper = interior(scenario.regions[on])
+    p_SO = X_WS.actInv(X_WO.translation)
+    if np.all(p_SO[:2] >= lower[:2]) and np.all(p_SO[:2] <= upper[:2]):
+        return None
+    limits = " and ".join(f"{a} {lower[i]:.3f} to {upper[i]:.3f}" for i, a in enumerate("xy"))
+    return f"lies off {on!r}: at ({p_SO[0]:.3f}, {p_SO[1]:.3f}) from its centre, expected {limits} m"
 
 
 def surroundings_problems(scenario: Scenario) -> Iterator[Problem]:

@@ -1,12 +1,13 @@
 """The disturbances that a scene file declares, resolved: references checked, poses in W, angles in rad."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from pinocchio import SE3
 
 from scenarios import schema
-from scenarios.checks import Problem
+from scenarios.checks import Problem, immovable, lies_off
 from scenarios.disturbance import (
     Bring,
     Disorder,
@@ -20,13 +21,16 @@ from scenarios.disturbance import (
     Take,
     WeakenGrip,
 )
-from scenarios.goal import GoalError, check_goal, goal_text, parse_goal
+from scenarios.document import KeyPath
+from scenarios.goal import GoalError, resolved_goal
 from scenarios.names import TABLE, known
 from scenarios.placing import body_frame, heights_of
 from scenarios.robots import ROBOTS
-from scenarios.scenario import Scenario
+from scenarios.scenario import Body, Scenario
 from scenarios.schema_disturbances import HAPPENINGS, Entry
-from scenarios.schema_parts import PoseOn
+from scenarios.schema_parts import Pose, PoseOn
+from scenarios.solids import body_solid
+from scenarios.standing import overlap_problem
 
 Triple = tuple[float, float, float]
 
@@ -59,14 +63,28 @@ def disturbance_problems(file: schema.SceneFile, scenario: Scenario) -> Iterator
             yield (*path, "link"), f"unknown link {entry.push.link!r}, {known(entry.push.link, links)}"
         if entry.push is not None and entry.push.link == facts.base:
             yield (*path, "link"), f"link {facts.base!r} doesn't move: it stands on the floor"
-        pose = entry.bring.pose if entry.bring is not None else None
-        if isinstance(pose, PoseOn) and pose.on not in (surfaces := {TABLE, *scenario.regions}):
-            yield (*path, "pose", "on"), f"unknown surface {pose.on!r}, {known(pose.on, surfaces)}"
+        if entry.bring is not None and entry.bring.pose is not None and name in scenario.bodies:
+            yield from _ill_placed(scenario, scenario.bodies[entry.bring.object], entry.bring.pose, path)
         if entry.goal is not None:
             try:
-                check_goal(parse_goal(entry.goal), scenario.bodies, scenario.regions)
+                _goal(entry.goal, scenario)
             except GoalError as error:
                 yield path, str(error)
+
+
+def _ill_placed(scenario: Scenario, body: Body, pose: Pose | PoseOn, path: KeyPath) -> Iterator[Problem]:
+    """What is brought onto nothing known, beside the surface that it is to lie on, or into what never moves."""
+    if isinstance(pose, PoseOn) and pose.on not in (surfaces := {TABLE, *scenario.regions}):
+        yield (*path, "pose", "on"), f"unknown surface {pose.on!r}, {known(pose.on, surfaces)}"
+        return
+    X_WO = body_frame(pose, body.shape, heights_of(scenario))
+    beside = lies_off(scenario, pose.on, X_WO) if isinstance(pose, PoseOn) else None
+    if beside is not None:
+        yield (*path, "pose", "xy"), beside
+        return
+    problem = overlap_problem(body_solid(replace(body, X_WO=X_WO)), immovable(scenario))
+    if problem is not None:
+        yield (*path, "pose"), f"{body.name!r} {problem}"
 
 
 def disturbances(file: schema.SceneFile, scenario: Scenario) -> tuple[Disturbance, ...]:
@@ -95,9 +113,13 @@ def _happening(entry: Entry, scenario: Scenario, heights: Mapping[str, float]) -
     if entry.grip is not None:
         return WeakenGrip(entry.grip.force, entry.grip.seconds)
     if entry.disorder is not None:
-        return Disorder(entry.disorder.what, entry.disorder.size, entry.disorder.seconds)
+        return Disorder(entry.disorder.what, entry.disorder.size or 0.0, entry.disorder.seconds)
     assert entry.goal is not None
-    return NewGoal(goal_text(parse_goal(entry.goal)))
+    return NewGoal(_goal(entry.goal, scenario))
+
+
+def _goal(text: str, scenario: Scenario) -> str:
+    return resolved_goal(text, scenario.bodies, scenario.regions, scenario.robot.model)
 
 
 def _triple(values: "list[float] | np.ndarray") -> Triple:

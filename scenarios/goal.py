@@ -70,6 +70,18 @@ def check_goal(literals: Collection[Literal], bodies: Collection[str], regions: 
             wanted[args[0]].append(literal)
 
 
+def resolved_goal(text: str, bodies: Mapping[str, Body], regions: Mapping[str, Region], model: str) -> str:
+    """A goal as it is written in a scene, `clear-table` or PDDL, as one PDDL conjunction. `model` names the robot.
+
+    Raises GoalError for what is neither, or makes no sense in the scene.
+    """
+    if text.strip() == CLEAR_TABLE:
+        return goal_text(clear_table(bodies, regions, model))
+    literals = parse_goal(text)
+    check_goal(literals, bodies, regions)
+    return goal_text(literals)
+
+
 def clear_table(bodies: Mapping[str, Body], regions: Mapping[str, Region], model: str) -> tuple[Literal, ...]:
     """What `clear-table` means here: crumbs in the dustpan (their home, else the nearest), the rest home or put away.
 

@@ -10,7 +10,7 @@ from scenarios import checks, schema
 from scenarios.disturbing import disturbance_problems, disturbances, late_ones
 from scenarios.document import Document, read_document
 from scenarios.forms import forms
-from scenarios.goal import CLEAR_TABLE, GoalError, check_goal, clear_table, goal_text, parse_goal
+from scenarios.goal import GoalError, resolved_goal
 from scenarios.library import scenario_path
 from scenarios.noise import NoFreePose, PoseNoise, draw_poses
 from scenarios.placing import declared_scenario
@@ -36,7 +36,8 @@ def build_scenario(document: Document, seed: int = 0) -> Scenario:
     _refuse(document, problems)
     scenario = replace(declared_scenario(file, shapes), late=late_ones(file))
     try:
-        scenario = replace(scenario, goal=_goal(scenario))
+        model = scenario.robot.model
+        scenario = replace(scenario, goal=resolved_goal(scenario.goal, scenario.bodies, scenario.regions, model))
     except GoalError as error:
         raise schema.invalid(document, ("goal",), str(error)) from None
     _refuse(document, checks.surface_problems(file, scenario))
@@ -54,14 +55,6 @@ def build_scenario(document: Document, seed: int = 0) -> Scenario:
         raise schema.invalid(document, path, f"seed {seed}: {error}") from None
     bodies = {name: replace(body, X_WO=poses.get(name, body.X_WO)) for name, body in scenario.bodies.items()}
     return replace(scenario, seed=seed, bodies=bodies)
-
-
-def _goal(scenario: Scenario) -> str:
-    if scenario.goal.strip() == CLEAR_TABLE:
-        return goal_text(clear_table(scenario.bodies, scenario.regions, scenario.robot.model))
-    literals = parse_goal(scenario.goal)
-    check_goal(literals, scenario.bodies, scenario.regions)
-    return goal_text(literals)
 
 
 def _noises(file: schema.SceneFile) -> dict[str, PoseNoise]:

@@ -31,6 +31,9 @@ Disordered = Literal[
 ]
 """What can be wrong with sensors and joints in a scene's disturbances."""
 
+SIZELESS: tuple[Disordered, ...] = ("force-missing", "force-frozen", "pose-missing")
+"""Of these, what has no size: all or nothing."""
+
 SURROUNDINGS = frozenset({TABLE, "floor", "pedestal", "robot", "world"})
 
 

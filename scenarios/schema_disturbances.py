@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from scenarios.names import Disordered
+from scenarios.names import SIZELESS, Disordered
 from scenarios.schema_parts import Angles, BodyPose, Number, Part, Position, Triple, problem
 
 Seconds = Annotated[Number, Field(ge=0, le=10_000)]
@@ -21,6 +21,12 @@ class MovedObject(Part):
     object: str
     by: Position = Field(default=[0.0, 0.0, 0.0], description="Shift in W, metres.")
     turn_deg: Angles = Field(default=[0.0, 0.0, 0.0], description="Turn about W's x, then y, then z, on the spot.")
+
+    @model_validator(mode="after")
+    def _is_put_elsewhere(self) -> "MovedObject":
+        if not any(self.by) and not any(self.turn_deg):
+            raise problem("", "nothing is moved, expected `by` or `turn_deg`")
+        return self
 
 
 class TakenObject(Part):
@@ -62,10 +68,18 @@ class Disorder(Part):
     """A sensor errs, or the joints rub."""
 
     what: Disordered
-    size: Annotated[Number, Field(ge=0, le=1000)] = Field(
-        default=0.0, description="Of force-bias and force-noise in N, of delays in s, pose-noise in m, friction in Nm."
+    size: Annotated[Number, Field(gt=0, le=1000)] | None = Field(
+        default=None, description="Of force-bias and force-noise in N, of delays in s, pose-noise in m, friction in Nm."
     )
     seconds: Lasting
+
+    @model_validator(mode="after")
+    def _has_a_size_where_one_is_needed(self) -> "Disorder":
+        if self.what in SIZELESS and self.size is not None:
+            raise problem("size", f"{self.what} has none, expected no size")
+        if self.what not in SIZELESS and self.size is None:
+            raise problem("", f"{self.what} has no size, expected `size`")
+        return self
 
 
 HAPPENINGS = ("move", "take", "bring", "shift", "push", "grip", "disorder", "goal")
@@ -94,7 +108,8 @@ class Entry(Part):
         if len(given) != 1:
             raise problem("", f"{len(given)} things happen, expected one of {', '.join(HAPPENINGS)}")
         if (self.at is None) == (self.phase is None):
-            raise problem("", "expected either `at` or `phase`")
+            many = "neither is given" if self.at is None else "both are given"
+            raise problem("", f"expected either `at` or `phase`, {many}")
         if self.at is not None and (self.action is not None or self.nth != 1 or self.after):
             raise problem("at", "stands alone; action, nth and after go with `phase`")
         return self

@@ -6,6 +6,9 @@ from pydantic_core import ErrorDetails
 
 from scenarios.document import KeyPath
 
+LISTS_OF_ENTRIES = ("disturbances", "compound")
+"""Keys whose lists hold mappings, not numbers."""
+
 
 def path_of(error: ErrorDetails) -> KeyPath:
     """The key path of a problem in the file."""
@@ -25,8 +28,10 @@ def message_of(error: ErrorDetails) -> str:
             return str(context["message"])
         case "missing":
             return f"missing key {error['loc'][-1]!r}, expected it here"
-        case "float_type" | "int_type":
+        case "float_type":
             return f"expected a number, {got}"
+        case "int_type" | "int_from_float":
+            return f"expected a whole number, {got}"
         case "finite_number":
             return f"expected a finite number, {got}"
         case "greater_than_equal" | "greater_than" | "less_than_equal" | "less_than":
@@ -44,6 +49,8 @@ def message_of(error: ErrorDetails) -> str:
             return f"expected at most {context['max_length']} entries, got {len(error['input'])}"
         case "literal_error":
             return f"expected {context['expected']}, {got}"
+        case "list_type" if error["loc"][-1] in LISTS_OF_ENTRIES:
+            return f"expected a list of entries, {got}"
         case "list_type":
             return f"expected a list of numbers, {got}"
         case "model_type" | "dict_type" | "model_attributes_type":

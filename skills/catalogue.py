@@ -18,6 +18,11 @@ def skills(toolkit: Toolkit) -> dict[str, Skill]:
     return {primitive.name: primitive(toolkit) for primitive in PRIMITIVES}
 
 
+def phases() -> dict[str, tuple[str, ...]]:
+    """The names of every primitive's phases, by the name of its action."""
+    return {primitive.name: primitive.phases for primitive in PRIMITIVES}
+
+
 def domain_path() -> Path:
     """The PDDL domain that describes the primitives."""
     return Path(str(files("skills") / "domain.pddl"))

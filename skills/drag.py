@@ -21,6 +21,7 @@ from skills.pressing import Pressing, in_order
 from skills.skill import Toolkit, Unfit, beyond_reach, laden, refine_by_sampling
 from skills.towing import (
     EDGE_MARGIN,
+    PHASES,
     Tips,
     fixed_in_way,
     is_on_top,
@@ -130,6 +131,7 @@ class Drag:
 
     name = "drag"
     arity = 2
+    phases: tuple[str, ...] = PHASES
 
     def __init__(self, toolkit: Toolkit) -> None:
         self._kit = toolkit

@@ -19,6 +19,7 @@ from skills.context import ActionRun, SkillContext
 from skills.pressing import Pressing, in_order
 from skills.skill import Toolkit, Unfit, beyond_reach, hand_would_hit, laden, refine_by_sampling
 from skills.towing import (
+    PHASES,
     Tips,
     footprint,
     is_on_top,
@@ -71,6 +72,7 @@ class DragAside:
 
     name = "drag_aside"
     arity = 2
+    phases: tuple[str, ...] = PHASES
 
     def __init__(self, toolkit: Toolkit) -> None:
         self._kit = toolkit

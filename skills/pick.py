@@ -58,6 +58,7 @@ class Pick:
 
     name = "pick"
     arity = 2
+    phases: tuple[str, ...] = ("pre-grasp", "approach", "close", "lift")
 
     def __init__(self, toolkit: Toolkit) -> None:
         self._kit = toolkit

@@ -79,6 +79,7 @@ class Place:
 
     name = "place"
     arity = 2
+    phases: tuple[str, ...] = ("pre-place", "descend", "open", "retreat")
 
     def __init__(self, toolkit: Toolkit) -> None:
         self._kit = toolkit

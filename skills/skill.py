@@ -30,10 +30,11 @@ UNCOUNTED = 30
 
 
 class Skill(Refiner, Protocol):
-    """A primitive: a refiner with a behaviour tree."""
+    """A primitive: a refiner with a behaviour tree. phases: the names of its phases, in order."""
 
     name: str
     arity: int
+    phases: tuple[str, ...]
 
     def subtree(self, run: ActionRun, context: SkillContext) -> Behaviour:
         """The tree that carries out `run.refinement`, which is filled in before its first motion."""

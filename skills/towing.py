@@ -211,6 +211,10 @@ def footprint(body: Body, X_WO: SE3) -> list[np.ndarray]:
     return [X_WO.act(centre + half * (2.0 * np.array(signs) - 1.0)) for signs in np.ndindex(2, 2, 2)]
 
 
+PHASES = ("close", "pre-drag", "approach", "descend", "drag", "retract")
+"""Names of the phases of whatever tows."""
+
+
 def tow(
     toolkit: Toolkit, action: GroundAction, scene: SceneState, X_WO_end: SE3, tips: Tips, pressing: Pressing
 ) -> tuple[Phase, ...] | MotionFailure | Unfit:

@@ -85,6 +85,7 @@ class Wipe:
 
     name = "wipe"
     arity = 3
+    phases: tuple[str, ...] = ("pre-wipe", "approach", "descend", "stroke", "retract")
 
     def __init__(self, toolkit: Toolkit) -> None:
         self._kit = toolkit

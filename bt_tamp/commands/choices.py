@@ -104,13 +104,14 @@ def startable_scenario_of(arguments: argparse.Namespace) -> "Scenario":
 
 
 def check_start(scenario: "Scenario", file: str) -> None:
-    """Raise SceneInvalid if the robot can't stand and begin where the scene has it."""
-    from bt_tamp.executive.start import start_problem
+    """Raise SceneInvalid if the robot can't stand and begin where the scene has it, or if a disturbance waits for a
+    phase that no skill has."""
+    from bt_tamp.executive.start import phase_problem, start_problem
     from scenarios.errors import SceneInvalid
 
-    problem = start_problem(scenario)
-    if problem is not None:
-        raise SceneInvalid(problem[1], file, f"robot.{problem[0]}")
+    for problem in (start_problem(scenario), phase_problem(scenario)):
+        if problem is not None:
+            raise SceneInvalid(problem[1], file, problem[0])
 
 
 def _check_names(options: "RunOptions") -> None:

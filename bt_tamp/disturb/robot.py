@@ -21,9 +21,14 @@ def push(now: Occasion) -> Deed:
     angle = now.rng.uniform(0.0, 2.0 * np.pi)
     link = LINKS[int(now.rng.integers(len(LINKS)))]
     force = (100.0 * float(np.cos(angle)), 100.0 * float(np.sin(angle)), 0.0)
+    return pushed(now, force, 0.1, link)
+
+
+def pushed(now: Occasion, force: tuple[float, float, float], seconds: float, link: str | None) -> Deed:
+    """Someone pushes a link (None: the tool centre) with a force in N, in W."""
     where = "the hand" if link is None else f"the arm at {link}"
-    fault = Push(start=now.t, end=now.t + 0.1, force=force, link=link)
-    return Deed(f"someone pushed {where} with 100 N for 0.1 s", (fault,), is_certain=True)
+    said = f"someone pushed {where} with {np.linalg.norm(force):.0f} N for {seconds:g} s"
+    return Deed(said, (Push(start=now.t, end=now.t + seconds, force=force, link=link),), is_certain=True)
 
 
 def weak_grip(now: Occasion) -> Deed | None:

@@ -6,6 +6,7 @@ from pinocchio import SE3
 
 from bt_tamp.disturb.deed import Deed, Draw, Occasion
 from bt_tamp.disturb.disorders import disordered
+from bt_tamp.disturb.robot import pushed
 from planner.task.facts import goal_facts
 from scenarios.disturbance import (
     Bring,
@@ -18,7 +19,7 @@ from scenarios.disturbance import (
     Take,
     WeakenGrip,
 )
-from sim.robot_faults import Push, WeakGrip
+from sim.robot_faults import WeakGrip
 from sim.world_faults import BinShifted, Brought, Moved, TakenAway
 
 
@@ -35,7 +36,7 @@ def _deed(happening: Happening, now: Occasion) -> Deed | None:
                 return None
             X = there[name]
             X_WO = SE3(pin.rpy.rpyToMatrix(*rpy) @ X.rotation, X.translation + np.array(by))
-            return Deed(f"{name} was moved", (Moved(start=t, name=name, X_WO=X_WO),), names=(name,))
+            return Deed(f"{name} was {_moved(by, rpy)}", (Moved(start=t, name=name, X_WO=X_WO),), names=(name,))
         case Take(name):
             return (
                 Deed(f"{name} was taken away", (TakenAway(start=t, name=name),), names=(name,))
@@ -43,15 +44,14 @@ def _deed(happening: Happening, now: Occasion) -> Deed | None:
                 else None
             )
         case Bring(name, X_WO):
-            if name in there:
+            if name in there or not now.stands_free(now.scenario.bodies[name], X_WO):
                 return None
             return Deed(f"{name} appeared", (Brought(start=t, name=name, X_WO=X_WO),), names=(name,))
         case ShiftRegion(region, by):
-            return Deed(f"{region} was shifted", (BinShifted(start=t, region=region, by=by),), names=(region,))
+            said = f"{region} was shifted by {_centimetres(by)}"
+            return Deed(said, (BinShifted(start=t, region=region, by=by),), names=(region,))
         case PushArm(force, seconds, link):
-            size = float(np.linalg.norm(force))
-            push = Push(start=t, end=t + seconds, force=force, link=link)
-            return Deed(f"someone pushed the arm with {size:.0f} N for {seconds:g} s", (push,), is_certain=True)
+            return pushed(now, force, seconds, link)
         case WeakenGrip(force, seconds):
             weak = WeakGrip(start=t, end=t + seconds, force=force)
             said = f"the gripper pressed with {force:g} N at most for {seconds:g} s"
@@ -60,4 +60,16 @@ def _deed(happening: Happening, now: Occasion) -> Deed | None:
         case Disorder(what, size, seconds):
             return disordered(now, what, size, seconds)
         case NewGoal(goal):
-            return Deed("something else was wanted from then on", goal=goal_facts(goal))
+            wanted = goal_facts(goal)
+            said = ", ".join(sorted(map(str, wanted)))
+            return Deed(f"what was wanted from then on: {said}", goal=wanted)
+
+
+def _moved(by: tuple[float, float, float], rpy: tuple[float, float, float]) -> str:
+    turn = f"turned by {np.degrees(np.linalg.norm(pin.log3(pin.rpy.rpyToMatrix(*rpy)))):.0f}°" if any(rpy) else ""
+    shift = f"moved by {_centimetres(by)}" if any(by) else ""
+    return " and ".join(part for part in (shift, turn) if part)
+
+
+def _centimetres(by: tuple[float, float, float]) -> str:
+    return f"{100 * np.linalg.norm(by):.0f} cm"

@@ -12,7 +12,7 @@ def why_declared(number: int, moment: Moment, met: int, tries: int, began: Itera
     """
     said = f"disturbances[{number}] of the scene did not come"
     if tries:
-        return f"{said}: there was nothing that it could be done to"
+        return f"{said}: there was nothing that it could be done to, or no room"
     if moment.at is not None:
         return f"{said}: the run was over before {moment.at:g} s"
     of = f"{moment.action}'s phase" if moment.action is not None else "phase"

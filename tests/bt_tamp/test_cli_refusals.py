@@ -34,6 +34,9 @@ def _alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "sunk.yaml").write_text(SCENE.replace("50}", "50, base: {xyz: [0.4, 0.0, -0.04]}}"))
     (tmp_path / "low.yaml").write_text(SCENE.replace("50}", "50, q0_deg: [0, 95, 0, -20, 0, 60, 0]}"))
     (tmp_path / "off.yaml").write_text(SCENE.replace("xy: [0.5, 0.0]", "xy: [0.5, 2.0]"))
+    take = SCENE + "disturbances: [{action: pick, phase: pregrasp, take: {object: mug}}]\n"
+    (tmp_path / "waits.yaml").write_text(take)
+    (tmp_path / "unheard.yaml").write_text(take.replace("pick", "pik"))
     (tmp_path / "broken.pddl").write_text("(define (problem p)")
     (tmp_path / "other.pddl").write_text(
         "(define (problem p) (:domain table) (:objects ghost - movable) (:init) (:goal ()))"
@@ -59,6 +62,8 @@ REFUSED = [
     (["run", "."], "."),
     (["validate", "goal.yaml"], "goal.yaml, goal"),
     (["validate", "sunk.yaml"], "sunk.yaml, robot.base: the robot's base stands in 'table'"),
+    (["run", "waits.yaml"], "waits.yaml, disturbances[0].phase: unknown phase 'pregrasp' of pick, did you mean 'pre-"),
+    (["validate", "unheard.yaml"], "unheard.yaml, disturbances[0].action: unknown action 'pik', did you mean 'pick'"),
     (["plan", "low.yaml"], "low.yaml, robot.q0_deg: the arm starts in collision ("),
     (["run", "small.yaml", "--seed", "-1"], "-1"),
     (["run", "small.yaml", "--seed", "one"], "one"),

@@ -21,7 +21,7 @@ disturbances:
   - {at: 0.6, shift: {region: left_bin, by: [0.05, 0.10, 0.0]}}
   - {at: 1.2, bring: {object: sponge}}
   - {at: 1.4, goal: "(in_bin sponge left_bin)"}
-  - {phase: pregrasp, action: pick, take: {object: cube}}
+  - {phase: stroke, action: wipe, take: {object: cube}}
   - {phase: pre-grasp, nth: 40, take: {object: cube}}
   - {at: 90, take: {object: cube}}
   - {at: 0.3, bring: {object: cube}}
@@ -64,7 +64,7 @@ def test_a_scenes_disturbances_befall_its_run_in_order_and_are_recorded(declared
     result = RunResult.from_json((declared / "one" / "result.json").read_text())
     assert [round(one.t, 1) for one in result.disturbances[:2]] == [0.1, 0.2]
     said = [one.sentence for one in result.disturbances]
-    assert said[:2] == ["cube was moved", "sponge was taken away"]
+    assert said[:2] == ["cube was moved by 3 cm", "sponge was taken away"]
     assert "sponge appeared" in said
     assert result.goal == {"in_bin(sponge, left_bin)": False}
     assert set(json.loads((declared / "one" / "scenario.json").read_text())["late"]) == set()
@@ -84,11 +84,11 @@ def test_the_story_tells_what_was_done(declared, capsys):
 def test_the_story_tells_what_was_declared_and_did_not_come(declared, capsys):
     assert main(["explain", str(declared / "one")]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "Disturbances[6] of the scene did not come: pick's phase 'pregrasp' did not begin; those that did:" in told
+    assert "Disturbances[6] of the scene did not come: wipe's phase 'stroke' did not begin; those that did:" in told
     assert "pre-grasp" in told.partition("those that did: ")[2].partition(".")[0]
     assert "Disturbances[7] of the scene did not come: phase 'pre-grasp' began " in told
     assert "Disturbances[8] of the scene did not come: the run was over before 90 s." in told
-    assert "Disturbances[9] of the scene did not come: there was nothing that it could be done to." in told
+    assert "Disturbances[9] of the scene did not come: there was nothing that it could be done to, or no room." in told
     assert "Disturbances[0]" not in told
 
 

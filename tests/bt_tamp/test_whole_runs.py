@@ -8,6 +8,8 @@ import sys
 import numpy as np
 import pytest
 
+from skills.catalogue import phases
+
 PAPER_PLAN = {
     "drag(book, table)",
     "pick(book, table)",
@@ -53,6 +55,16 @@ def test_fig1_goes_from_a_scene_file_to_a_clean_table_by_the_papers_nine_actions
     assert result["torque_limit_violations"] == 0
     assert result["unintended_contacts"] == []
     assert result["peak_contact_force_n"] < 60.0
+
+
+def test_every_phase_of_fig1_is_one_that_its_skill_declares_in_that_order(fig1):
+    events = [json.loads(line) for line in (fig1 / "events.jsonl").read_text().splitlines()]
+    begun = {}
+    for event in events:
+        if event["kind"] == "phase":
+            begun.setdefault(event["action"], []).append(event["phase"])
+    assert len(begun) == 9
+    assert all(tuple(names) == phases()[action.partition("(")[0]] for action, names in begun.items())
 
 
 def test_fig1_leaves_a_complete_folder(fig1):

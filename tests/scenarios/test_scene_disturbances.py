@@ -66,6 +66,16 @@ def test_what_is_taken_before_it_is_brought_back_is_there_at_the_start():
         read("{at: 1, take: {object: tin}}", BRINGS)
 
 
+def test_a_goal_may_be_clear_table_from_then_on():
+    found = read(BRINGS, "{at: 6, goal: clear-table}").disturbances
+    assert found[1].happening == NewGoal("(and (put_away cup) (put_away tin))")
+
+
+def test_disturbances_that_are_no_list_are_refused():
+    with pytest.raises(SceneInvalid, match="expected a list of entries, got nothing"):
+        read()
+
+
 @pytest.mark.parametrize(
     ("entry", "complaint"),
     [
@@ -75,9 +85,16 @@ def test_what_is_taken_before_it_is_brought_back_is_there_at_the_start():
         ("{at: 1, push: {force: [1, 0, 0], seconds: 1, link: link_0}}", "link 'link_0' doesn't move"),
         ("{at: 1, bring: {object: tin, pose: {on: shelf, xy: [0, 0]}}}", "unknown surface 'shelf'"),
         ('{at: 1, goal: "(in_bin cap crate)"}', "unknown object 'cap'"),
+        ("{at: 1, bring: {object: tin, pose: {on: table, xy: [5, 0]}}}", "lies off 'table'"),
+        ("{at: 1, bring: {object: tin, pose: {xyz: [0.6, 0, 0.05]}}}", "'tin' overlaps 'table'"),
+        ("{at: 1, move: {object: cup}}", "nothing is moved, expected `by` or `turn_deg`"),
+        ("{at: 1, disorder: {what: pose-delay, seconds: 1}}", "pose-delay has no size, expected `size`"),
+        ("{at: 1, disorder: {what: pose-missing, size: 1, seconds: 1}}", "pose-missing has none, expected no size"),
+        ("{phase: lift, nth: 1.5, take: {object: cup}}", "expected a whole number, got 1.5"),
         ("{at: 1}", "0 things happen"),
         ("{at: 1, take: {object: cup}, bring: {object: tin}}", "2 things happen"),
-        ("{take: {object: cup}}", "either `at` or `phase`"),
+        ("{take: {object: cup}}", "either `at` or `phase`, neither is given"),
+        ("{at: 1, phase: lift, take: {object: cup}}", "either `at` or `phase`, both are given"),
         ("{at: 1, nth: 2, take: {object: cup}}", "stands alone"),
         ("{at: -1, take: {object: cup}}", "disturbances"),
         ("{at: 1, disorder: {what: headache, seconds: 1}}", "headache"),
