@@ -17,7 +17,7 @@ from bt_tamp.quiet import outliving_a_closed_pipe
 COMMANDS = {
     "run": "run a scene: plan, act, plan again until the goal is reached",
     "plan": "plan a scene without acting: rounds, what failed, what was learned, the plan",
-    "list": "list the scenes that ship with the package",
+    "list": "list the scenes that ship with the package, or the classes of disturbances",
     "validate": "check a scene file",
     "generate": "write a random scene file: solvable by construction, or unsolvable in a known way",
     "schema": "print the scene format as JSON Schema",

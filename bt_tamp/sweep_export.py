@@ -24,7 +24,8 @@ def write_csv(folder: Path, runs: Sequence[Run], lines: Sequence[Line]) -> list[
         writer.writerow([*names, "low", "high", "reasons"])
         for line in lines:
             reasons = "; ".join(f"{count}× {why}" for why, count in line.reasons)
-            writer.writerow([*(getattr(line, name) for name in names), *line.interval, reasons])
+            interval = line.interval if line.runs else ("", "")
+            writer.writerow([*(getattr(line, name) for name in names), *interval, reasons])
     return [folder / "runs.csv", folder / "table.csv"]
 
 
@@ -52,8 +53,8 @@ def plot(folder: Path, lines: Sequence[Line]) -> list[Path]:
         names = list(dict.fromkeys(line.befell for line in mine))
         figure, (left, right) = plt.subplots(1, 2, figsize=(11, 1.5 + 0.28 * len(names)), sharey=True)
         for replan, colour, shift in ((True, "C0", 0.15), (False, "C3", -0.15)):
-            for line in (line for line in mine if line.replan == replan):
-                y, rate = names.index(line.befell) + shift, line.succeeded / max(line.runs, 1)
+            for line in (line for line in mine if line.replan == replan and line.runs):
+                y, rate = names.index(line.befell) + shift, line.succeeded / line.runs
                 low, high = line.interval
                 left.plot([low, high], [y, y], color=colour, linewidth=1.5)
                 left.plot([rate], [y], "o", color=colour, markersize=4)
@@ -64,9 +65,11 @@ def plot(folder: Path, lines: Sequence[Line]) -> list[Path]:
         for axes in (left, right):
             axes.grid(axis="x", color="0.9")
             axes.set_axisbelow(True)
-        left.set_xlim(0.0, 1.02)
+        left.set_xlim(-0.02, 1.02)
         left.set_xlabel("success rate, 95 % interval")
-        left.set_title(f"{scene_name(scene)}: watching (blue), open loop (red)")
+        ways = {True: "watching (blue)", False: "open loop (red)"}
+        told = ", ".join(way for replan, way in ways.items() if any(line.replan == replan for line in mine))
+        left.set_title(f"{scene_name(scene)}: {told}")
         right.set_xlabel("median robot time lost, s")
         path = folder / f"{scene_name(scene)}.png"
         figure.tight_layout()

@@ -262,7 +262,7 @@ def totals(runs: Sequence[Run]) -> list[str]:
 def _share(runs: Sequence[Run]) -> str:
     succeeded = sum(run.succeeded for run in runs)
     low, high = wilson(succeeded, len(runs))
-    rate = f"{100 * succeeded / len(runs):.1f} %, {100 * low:.0f}–{100 * high:.0f}"
+    rate = f"{100 * succeeded / len(runs):.1f} %, {100 * low:.1f}–{100 * high:.1f}"
     return f"{succeeded} of {len(runs)} ({rate})"
 
 

@@ -245,7 +245,7 @@ class SearchThenSample:
         """What the task planner says, its own failure or a plan that doesn't work taken for finding none."""
         try:
             found = self._task_planner.solve(domain, problem, self._settings.max_expansions)
-            if not isinstance(found, TaskPlan | NoTaskPlan):
+            if not isinstance(found, TaskPlan | NoTaskPlan) or not isinstance(found.expansions, int):
                 return NoTaskPlan(False, 0, f"it answered {found!r}")
             wrong = flaw(found, stated.init, stated.goal) if isinstance(found, TaskPlan) else None
         except PddlError:

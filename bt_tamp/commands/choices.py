@@ -48,7 +48,8 @@ def add_disturbances(parser: argparse.ArgumentParser) -> None:
         "--disturb",
         default="none",
         metavar="CLASS,…",
-        help=f"classes of disturbances, all or none (default); {', '.join(CLASSES)}",
+        help="classes of disturbances, all or none (default); `bt-tamp list --disturbances` says what each does:"
+        f" {', '.join(CLASSES)}",
     )
     group.add_argument(
         "--no-replan",

@@ -26,7 +26,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Scene, options, folder, picture."""
     add_scene(parser, is_optional=True)
     parser.add_argument(
-        "--resume", type=Path, metavar="DIR", help="go on from where the run in this folder ended, in place of a SCENE"
+        "--resume",
+        type=Path,
+        metavar="DIR",
+        help="go on, with its options, from where the run in this folder ended, in place of a SCENE; what was still to"
+        " befall that one doesn't come again",
     )
     parser.add_argument(
         "--render", action="store_true", help="PyBullet's window where there is a display, else an MP4 after the run"
@@ -95,8 +99,9 @@ def _beginning(arguments: argparse.Namespace) -> "tuple[Scenario, RunState | Non
     from bt_tamp.report.state import RunState
 
     folder = existing_run(arguments.resume)
-    with refusing(OSError, ValueError, about=str(folder)):
+    with refusing(OSError, ValueError, about=str(folder / SCENARIO)):
         scenario = scenario_from_json((folder / SCENARIO).read_text(encoding="utf-8"))
+    with refusing(OSError, ValueError, about=str(folder / STATE)):
         start = RunState.from_json((folder / STATE).read_text(encoding="utf-8"))
         return start.applied(scenario), start
 

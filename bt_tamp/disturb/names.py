@@ -43,7 +43,7 @@ CLASSES: dict[str, Declared] = {
     "qp-infeasible": Declared("the controller's QP has no solution for 40 ms, a dozen times"),
     "qp-iterations": Declared("the controller's QP runs out of iterations for 40 ms, a dozen times"),
     "motion-budget": Declared("the motion planner is out of budget in every fourth query"),
-    "task-planner": Declared("the task planner crashes, talks nonsense or runs out of budget three times"),
+    "task-planner": Declared("the task planner crashes, talks nonsense or runs out of budget up to three times"),
     "taken-for-good": Declared("an object that the goal is about is taken away for good", is_reachable=False),
     "sponge-out-of-reach": Declared("the sponge is thrown on the floor, out of reach", is_reachable=False),
 }
@@ -58,6 +58,8 @@ def chosen(text: str) -> tuple[str, ...]:
     names = tuple(dict.fromkeys(part.strip() for part in text.split(",")))
     for name in names:
         if name not in CLASSES:
+            if name in ("all", "none"):
+                raise ValueError(f"{name!r} stands alone, without other classes")
             raise ValueError(f"unknown class of disturbance {name!r}, {known(name, CLASSES)}")
     return names
 

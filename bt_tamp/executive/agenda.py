@@ -209,7 +209,7 @@ class Agenda:
         more = self.pursued(scene) - self.plan.goal
         come = _about(more)
         if more <= self._released:
-            return f"the rest is done, and a way for {', '.join(come) or 'it'} is looked for once more"
+            return f"with the rest done, a way for {' and '.join(come) or 'it'} is looked for once more"
         if not come:
             return "something else is wanted now"
         return f"{', '.join(come)} {'is' if len(come) == 1 else 'are'} wanted now, too"

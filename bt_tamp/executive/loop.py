@@ -310,7 +310,7 @@ def _result(machine: Machine, scenario: Scenario, ending: Ending, audits: Audits
     context, agenda, thinking = machine.context, machine.agenda, machine.planner.thinking
     known = agenda.facts(context.scene)
     held = context.scene.held
-    places = {name: _place(context.scene, name) for name in scenario.bodies}
+    places = {name: _place(context.scene, name) for name in scenario.bodies if name not in agenda.unseen}
     if held is not None:
         places[held.name] = "hand"
     return RunResult(

@@ -2,13 +2,16 @@
 
 from bt_tamp.report.events import Event
 
+GONE_ON = "gone on from where another run ended, whose disturbances don't come again"
+
 
 def sentence(event: Event) -> str | None:
     """The event as a sentence without a full stop; None for events that only mark progress."""
     data = event.data
     match event.kind:
         case "run_started":
-            return f"{data['scene']}, seed {data['seed']}: planning (a first run compiles too; times are the robot's)"
+            said = f"{data['scene']}, seed {data['seed']}: planning (a first run compiles too; times are the robot's)"
+            return f"{said}; {GONE_ON}" if data.get("resumed") else said
         case "round":
             return f"round {data['round']}: {planner_failed(event) or _proposal(data['plan'])}"
         case "proof_sought":

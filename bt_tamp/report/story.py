@@ -7,7 +7,7 @@ from typing import Any
 from bt_tamp.replay import words
 from bt_tamp.report.events import Event
 from bt_tamp.report.result import RunResult
-from bt_tamp.report.sentences import counted, in_the_way, planner_failed
+from bt_tamp.report.sentences import GONE_ON, counted, in_the_way, planner_failed
 
 WIDTH = 100
 
@@ -47,15 +47,14 @@ class _Teller:
     def _run_started(self, event: Event, data: Any) -> None:
         noise = "the nominal scene" if data["seed"] == 0 else "with that seed's noise"
         if data.get("resumed"):
-            noise = "gone on from where another run ended"
+            noise = GONE_ON
         told = "".join(f", {word}" for word in [" ".join(words(data.get("choices", {})))] if word)
         self._heading(f"{data['scene']}, seed {data['seed']} ({noise}){told}")
 
     def _round(self, event: Event, data: Any) -> None:
         if not self._is_planning:
-            self._is_planning = True
             self._proposed = None
-            self._heading(f"Planning, at {event.t:.1f} s" if self._plans else "Planning before anything is done")
+            self._begin_planning(event.t)
         plan = data["plan"]
         lead, failed = f"Round {data['round']}: ", planner_failed(event)
         if failed:
@@ -65,6 +64,10 @@ class _Teller:
         else:
             self._say(f"{lead}{_proposal(plan, self._proposed)}")
             self._proposed = plan
+
+    def _begin_planning(self, t: float) -> None:
+        self._is_planning = True
+        self._heading(f"Planning, at {t:.1f} s" if self._plans else "Planning before anything is done")
 
     def _proof_sought(self, event: Event, data: Any) -> None:
         failed = planner_failed(event)
@@ -91,12 +94,18 @@ class _Teller:
         )
 
     def _solved(self, event: Event, data: Any) -> None:
-        steps = counted(len(data["plan"]), "action")
-        self._say(f"A way was found to do all of it: {steps}, after {counted(data['rounds'], 'round')}.", "  - ")
+        if not data["plan"]:
+            return
+        steps, fewer = counted(len(data["plan"]), "action"), len(data["plan"]) < len(self._proposed or ())
+        along = ", what else was proposed comes along" if fewer else ""
+        self._say(f"A way was found to do all of it: {steps}{along}; {counted(data['rounds'], 'round')}.", "  - ")
 
     def _plan_installed(self, event: Event, data: Any) -> None:
         self._plans += 1
         self._is_planning = False
+        if not data["actions"]:
+            self._heading("What was done")
+            return
         self._heading(f"Plan {self._plans}, in force from {event.t:.1f} s")
         for number, action in enumerate(data["actions"], start=1):
             self._say(action, f"  {number:2}. ")
@@ -135,8 +144,8 @@ class _Teller:
             where = f" in its phase {self._phases[-1]!r}" if self._phases else ""
             self._say(f"{self._running} was broken off{where}.", f"{event.t:7.1f} s          ")
             self._running = None
-        reason = "" if data["reason"] == self._last_failure else f", because {data['reason']}"
-        self._say(f"The plan was dropped{reason}, and a new one sought from what was observed then.")
+        reason = "" if data["reason"] == self._last_failure else f": {data['reason']}"
+        self._say(f"The plan was dropped{reason}. A new one was sought from what was observed then.")
 
     def _put_off(self, event: Event, data: Any) -> None:
         self._is_planning = False
@@ -144,6 +153,8 @@ class _Teller:
 
     def _disturbed(self, event: Event, data: Any) -> None:
         during = f"{data['action']} in its phase {data['phase']!r}" if data.get("action") else repr(data["phase"])
+        if not self._plans and not self._is_planning:
+            self._begin_planning(event.t)
         meanwhile = ", while planning" if data["phase"] == "planning" else f", during {during}"
         self._say(f"DISTURBANCE{meanwhile}: {data['sentence']}.", f"{event.t:7.1f} s          ")
 
@@ -174,14 +185,16 @@ class _Teller:
         missing = [literal for literal, holds in result.goal.items() if not holds]
         if missing:
             self._say(f"Of the goal, {', '.join(missing)} did not hold.")
+        for sentence in self._unmet:
+            self._say(sentence[0].upper() + sentence[1:] + ".")
+        felt = f"{result.peak_contact_force_n:.1f} N as felt along what was pressed"
         self._say(
             f"Robot time {result.robot_s:.1f} s, real time {result.wall_s:.1f} s, of which planning took"
             f" {result.planning_wall_s:.1f} s ({result.planning_cpu_s:.1f} s of CPU,"
-            f" {counted(result.rounds, 'round')}, {counted(result.replans, 'replan')}). Contact force reached"
-            f" {result.peak_contact_force_n:.1f} N; {counted(len(result.unintended_contacts), 'unintended contact')}."
+            f" {counted(result.rounds, 'round')}, {counted(result.replans, 'replan')}). Contact force truly"
+            f" reached {result.peak_force_n:.1f} N ({felt});"
+            f" {counted(len(result.unintended_contacts), 'unintended contact')}."
         )
-        for sentence in self._unmet:
-            self._say(sentence[0].upper() + sentence[1:] + ".")
         for motion in result.pressed:
             self._say(
                 f"{motion.action} pressed with {motion.mean_n:.2f} N, {motion.target_n:.4g} N wanted: off by"

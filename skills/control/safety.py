@@ -30,6 +30,10 @@ SENSOR_PATIENCE = 0.02
 """Seconds without a wrist reading after which force control is blind."""
 
 
+def _held_against(value: float, limit: float) -> str:
+    return f"{'near' if value < limit else 'beyond'} the safety limit of"
+
+
 @dataclass(frozen=True)
 class ForceTooHigh:
     """The contact force came near its limit, N."""
@@ -38,7 +42,7 @@ class ForceTooHigh:
     limit: float
 
     def __str__(self) -> str:
-        return f"{self.force:.0f} N of contact force, and {self.limit:.0f} N is the safety limit"
+        return f"{self.force:.0f} N of contact force, {_held_against(self.force, self.limit)} {self.limit:.0f} N"
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class TooFast:
     limit: float
 
     def __str__(self) -> str:
-        return f"the hand moved at {self.speed:.2f} m/s, and {self.limit:.2f} m/s is the safety limit"
+        return f"the hand moved at {self.speed:.2f} m/s, {_held_against(self.speed, self.limit)} {self.limit:.2f} m/s"
 
 
 @dataclass(frozen=True)

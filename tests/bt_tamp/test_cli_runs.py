@@ -10,6 +10,7 @@ import pytest
 
 from bt_tamp.cli import COMMANDS, main
 from bt_tamp.display import has_display
+from bt_tamp.disturb.names import CLASSES
 from planner.search_then_sample import SearchThenSample
 
 TABLE = """\
@@ -79,6 +80,13 @@ def test_every_shipped_scene_is_listed_and_valid(capsys: pytest.CaptureFixture[s
     names = capsys.readouterr().out.split()
     assert {"fig1", "fig1_wipe", "fig2", "fig3"} <= set(names)
     assert main(["validate", *names]) == 0
+
+
+def test_every_class_of_disturbances_is_listed_with_what_it_does(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "--disturbances"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(CLASSES)
+    assert "taken away for good (the goal is out of reach then)" in next(x for x in lines if x.startswith("taken-for"))
 
 
 def test_every_file_is_validated_also_after_one_that_is_not_fine(tmp_path, capfd):

@@ -43,7 +43,7 @@ def test_the_story_says_so(thrown_away, capsys):
     told = " ".join(capsys.readouterr().out.split())
     assert "There was no way to put_away(can): " in told
     assert "The rest was to be done first." in told
-    assert "because the rest is done, and a way for can is looked for once more" in told
+    assert "The plan was dropped: with the rest done, a way for can is looked for once more. A new one" in told
 
 
 def test_before_anything_has_moved_it_is_told_at_once(tmp_path):

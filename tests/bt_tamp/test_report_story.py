@@ -67,7 +67,7 @@ def test_the_story_of_a_run_that_goes_on_tells_its_options_what_was_skipped_and_
     interrupted = RunResult("desk", 0, "interrupted", "the run was interrupted, the arm brought to rest", {})
     told = " ".join(story(events, interrupted).split())
     for expected in (
-        "desk, seed 0 (gone on from where another run ended), --contact impedance",
+        "desk, seed 0 (gone on from where another run ended, whose disturbances don't come again), --contact impedance",
         "1.0 s Skipped, as it was done already: pick(book, table), place(book, crate).",
         "2.0 s To be done again, as holding(book) did not hold: pick(book, table).",
         "Before its end the run was interrupted, the arm brought to rest.",
@@ -100,7 +100,7 @@ def test_the_story_tells_plans_failures_lessons_deeds_and_end_in_their_order() -
         "Plan 1, in force from 0.4 s",
         "drag(book, table): descend.",
         "pick(book, table) failed in its phase 'close': the fingers closed on air.",
-        "a new one sought",
+        "A new one was sought",
         "Round 3: with what had been learned, no sequence of actions led to the goal.",
         "There was no plan: no plan found.",
         "in_bin(book, crate) did not hold",

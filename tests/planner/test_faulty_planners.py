@@ -59,7 +59,13 @@ def steps_that_are_none(found):
     return replace(found, steps=(None,)) if isinstance(found, TaskPlan) else found
 
 
-@pytest.mark.parametrize("spoil", [crash, without_its_first_step, nothing_at_all, steps_that_are_none])
+def work_that_is_no_number(found):
+    return replace(found, expansions=None)
+
+
+@pytest.mark.parametrize(
+    "spoil", [crash, without_its_first_step, nothing_at_all, steps_that_are_none, work_that_is_no_number]
+)
 def test_a_task_planner_that_fails_once_is_asked_again(spoil, tabletop, stand_in):
     outcome = planned(Faulty(spoil, 1), stand_in(lambda *_: None), tabletop("cup"))
     assert isinstance(outcome, Solution)
