@@ -35,6 +35,7 @@ class _Teller:
         self._running: str | None = None
         self._last_failure = ""
         self._unmet: list[str] = []
+        self._waits_since: float | None = None
 
     def hear(self, event: Event) -> None:
         tell = getattr(self, f"_{event.kind}", None)
@@ -102,7 +103,7 @@ class _Teller:
 
     def _plan_installed(self, event: Event, data: Any) -> None:
         self._plans += 1
-        self._is_planning = False
+        self._is_planning, self._waits_since = False, None
         if not data["actions"]:
             self._heading("What was done")
             return
@@ -163,6 +164,7 @@ class _Teller:
 
     def _missing(self, event: Event, data: Any) -> None:
         names = ", ".join(data["bodies"])
+        self._waits_since = event.t
         self._say(f"The arm waited for {names} to turn up again.", f"{event.t:7.1f} s          ")
 
     def _waiting(self, event: Event, data: Any) -> None:
@@ -181,6 +183,8 @@ class _Teller:
         if result is None:
             self._say("The run was cut off: it left no result.")
             return
+        if self._waits_since is not None:
+            self._say(f"The arm had waited in vain since {self._waits_since:.1f} s.")
         self._say(_ENDINGS[result.outcome].format(reason=result.reason))
         missing = [literal for literal, holds in result.goal.items() if not holds]
         if missing:

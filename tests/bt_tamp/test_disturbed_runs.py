@@ -167,4 +167,6 @@ def test_the_story_tells_that_the_arm_waited_for_what_is_gone(tmp_path, capsys):
     )
     assert main(["run", str(tmp_path / "scene.yaml"), "--out", str(tmp_path / "run")]) == 11
     assert main(["explain", str(tmp_path / "run")]) == 0
-    assert "The arm waited for box to turn up again." in " ".join(capsys.readouterr().out.split())
+    told = " ".join(capsys.readouterr().out.split())
+    assert "The arm waited for box to turn up again." in told
+    assert "The arm had waited in vain since 0." in told
