@@ -169,4 +169,4 @@ def test_the_story_tells_that_the_arm_waited_for_what_is_gone(tmp_path, capsys):
     assert main(["explain", str(tmp_path / "run")]) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "The arm waited for box to turn up again." in told
-    assert "The arm had waited in vain since 0." in told
+    assert "The arm had waited in vain since 2." in told
