@@ -20,8 +20,9 @@ ROTATION_DAMPING = 2.0
 """1/s at which a thing's turning dies away: without it a glass on its rim or a ball never come to rest. Bullet's own
 rolling friction does it too, but doubles the cost of every contact."""
 
-ROLLING_FRICTION = 1e-4
-"""Metres: a cylinder's resistance to rolling. Without it Bullet has one that lies at rest roll off at 8 mm/s."""
+ROLLING_FRICTION = 1e-3
+"""Metres, times the friction of what it lies on: a cylinder's resistance to rolling. Without it Bullet has one that
+lies at rest roll off at 8 mm/s, with a tenth of it some still do."""
 
 ASLEEP = 1e-6
 """(m/s)² plus (rad/s)² below which, for two seconds, a thing is left out of the sums until something touches it or what

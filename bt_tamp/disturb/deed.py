@@ -1,6 +1,6 @@
 """What is done to a run at one moment, and what whoever does it sees before."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -157,8 +157,9 @@ class Occasion:
         places = [(table.X_WT, table.size), *((region.X_WR, region.size) for region in self.scenario.regions.values())]
         return any((np.abs(X_WS.actInv(p)[:2]) < np.array(size[:2]) / 2 - CAUGHT).all() for X_WS, size in places)
 
-    def stands_free(self, body: Body, X_WO: SE3) -> bool:
-        """Can a body be put at X_WO without overlapping anything, the arm and what it holds included?"""
+    def stands_free(self, body: Body, X_WO: SE3, soon: Sequence[np.ndarray] = ()) -> bool:
+        """Can a body be put at X_WO without overlapping anything, the arm and what it holds included, where that is now
+        and at `soon` (7,) as well?"""
         around = [
             body_solid(self.scenario.bodies[name], X) for name, X in self.truth.poses.items() if name != body.name
         ]
@@ -171,7 +172,8 @@ class Occasion:
         # What the arm or what it holds touches besides, a sponge the table in a stroke, is no matter here.
         mine = frozenset(part_names(self.machine.robot, scene.held))
         others = frozenset(obstacle.name for obstacle in obstacles(alone)) - {body.name}
-        return self.motion.free(alone, self.truth.q, pairs(mine, others), CLEARANCE)
+        allowed = pairs(mine, others)
+        return all(self.motion.free(alone, q, allowed, CLEARANCE) for q in (self.truth.q, *soon))
 
     def spot(self, body: Body, rotation: np.ndarray, around: np.ndarray, distances: tuple[float, float]) -> SE3 | None:
         """A free place on the table for a body turned so: its distance (m) in the plane from `around` (2,) within

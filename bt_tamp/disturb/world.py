@@ -45,6 +45,9 @@ AHEAD = 15
 """Seconds ahead, at least, and at how many spots, at which a motion is blocked: a hand in a slow stroke takes up much
 of what lies before it."""
 
+STOPPING = np.linspace(0.05, 0.3, 6)
+"""Seconds ahead at which the arm is kept clear: nothing sees and stops at once."""
+
 AWAY = (2.0, 5.0)
 """Seconds for which something is gone."""
 
@@ -158,6 +161,7 @@ def path_blocked(now: Occasion, name: str) -> Deed | None:
     body, passed = now.scenario.bodies[name], controller.time_in_reference
     z = now.table_height() + depth_below(body.shape, np.eye(3)) + 5e-4
     robot = now.machine.robot
+    soon = [phase.trajectory.at(float(t))[0] for t in passed + STOPPING]
     for t in now.rng.permutation(np.linspace(passed + SOON, phase.trajectory.duration, AHEAD)).tolist():
         if t < passed + SOON:
             continue
@@ -166,7 +170,7 @@ def path_blocked(now: Occasion, name: str) -> Deed | None:
         on_table = (
             np.abs(now.scenario.table.X_WT.actInv(X_WO.translation)[:2]) < np.array(now.scenario.table.size[:2]) / 2
         )
-        if not on_table.all() or not now.stands_free(body, X_WO):
+        if not on_table.all() or not now.stands_free(body, X_WO, soon):
             continue
         scene = now.scene.moved(name, X_WO)
         hit = now.motion.audit(scene, phase.trajectory, phase.allowed, since=passed, only=frozenset({name}))

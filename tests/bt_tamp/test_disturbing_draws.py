@@ -22,9 +22,11 @@ from bt_tamp.disturb.world import (
 )
 from bt_tamp.executive.build import build
 from bt_tamp.options import RunOptions
+from planner.motion.collision import part_names
 from planner.motion.motion_planner import MotionPlanner
 from planner.motion.trajectory import Trajectory
-from planner.refinement import Phase
+from planner.motion.world import obstacles
+from planner.refinement import Phase, pairs
 from planner.task.facts import goal_facts
 from planner.task.symbols import Fact, GroundAction
 from scenarios.document import parse_document
@@ -259,6 +261,32 @@ def test_what_stands_in_the_way_already_is_not_put_there_once_more():
     machine.plant.bring(post, deeds[0].faults[0].X_WO)
     assert drawn(phase) == (None, None)
     machine.plant.close()
+
+
+def test_nothing_is_put_so_close_before_the_hand_that_no_arm_could_stop():
+    scenario = amended(load_scenario("fig1"), ("path-blocked",))
+    (post,) = scenario.late
+    machine = build(scenario, RunOptions(), lambda kind, **data: None, lambda why: None)
+    outcome = machine.planner.plan(machine.context.scene, machine.agenda)
+    machine.agenda.adopt(outcome.plan, outcome.refinements, machine.context, "planned")
+    machine.agenda.begin()
+    seen, motion, blocked = machine.plant.observe(), MotionPlanner(machine.robot), 0
+    for phase in (phase for refinement in outcome.refinements for phase in refinement.phases if phase.kind == "move"):
+        path, k = phase.trajectory, len(phase.trajectory.times) // 3
+        left = Trajectory(path.times[k:] - path.times[k], path.q[k:], path.v[k:])
+        machine.context.phase = replace(phase, trajectory=left)
+        now = Occasion(0.0, replace(seen, q=left.start), machine, motion, np.random.default_rng(0))
+        for _ in range(10):
+            deed = path_blocked(now, post)
+            if deed is None:
+                continue
+            there = now.scene.moved(post, deed.faults[0].X_WO)
+            others = frozenset(obstacle.name for obstacle in obstacles(there)) - {post}
+            allowed = pairs(frozenset(part_names(machine.robot, None)), others)
+            assert all(motion.free(there, left.at(t)[0], allowed, 0.0) for t in np.linspace(0.0, 0.3, 31)), phase.name
+            blocked += 1
+    machine.plant.close()
+    assert blocked > 10
 
 
 def test_what_undoes_something_that_is_done_matters():

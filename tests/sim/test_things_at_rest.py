@@ -69,12 +69,16 @@ def test_what_is_struck_moves(stack):
     assert np.linalg.norm(spot(stack, "upper") - before) > 0.01
 
 
-def test_a_cylinder_that_lies_does_not_roll_off_by_itself():
+def test_cylinders_that_lie_do_not_roll_off_by_themselves():
     scenario = load_scenario("fig1", 0)
-    radius = 0.011
-    lying = SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0.0, 0.6), np.array([0.6, 0.1, 0.05 + radius]))
-    rod = Body("rod", Cylinder(radius, 0.24), 0.06, 0.6, (1.0, 0.0, 0.0, 1.0), lying)
-    plant = BulletPlant(replace(scenario, bodies={"rod": rod}), RobotModel())
-    wait(plant, 2.0)
-    assert np.linalg.norm(spot(plant, "rod") - lying.translation) < 1e-3
+    sizes = {"rod": (0.011, 0.24), "can": (0.027, 0.088), "jar": (0.045, 0.07), "tube": (0.016, 0.12)}
+    lying = {}
+    for k, (name, (radius, height)) in enumerate(sizes.items()):
+        p = np.array([0.62, -0.15 + 0.14 * k, 0.05 + radius])
+        X_WO = SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0.0, 0.6 + 0.7 * k), p)
+        lying[name] = Body(name, Cylinder(radius, height), 0.09, 0.55, (1.0, 0.0, 0.0, 1.0), X_WO)
+    plant = BulletPlant(replace(scenario, bodies=lying), RobotModel())
+    wait(plant, 6.0)
+    ways = {name: np.linalg.norm(spot(plant, name) - body.X_WO.translation) for name, body in lying.items()}
     plant.close()
+    assert max(ways.values()) < 1e-3, ways
