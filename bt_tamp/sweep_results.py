@@ -115,10 +115,11 @@ class Line:
 
 def runs_of(stored: Iterable[Stored]) -> list[Run]:
     """The stored runs."""
-    return [_run(row) for row in stored]
+    return [run_of(row) for row in stored]
 
 
-def _run(row: Stored) -> Run:
+def run_of(row: Stored) -> Run:
+    """A stored run."""
     disturb = ",".join(row.options.get("disturb", ())) or UNDISTURBED
     result = None if row.result is None else RunResult.from_json(row.result)
     return Run(

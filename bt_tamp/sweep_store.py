@@ -4,7 +4,7 @@ import json
 import sqlite3
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -29,27 +29,22 @@ _COLUMNS = frozenset("scene seed options outcome reason result tries".split())
 
 
 @dataclass(frozen=True)
-class Row:
-    """A stored run. `result` is `result.json` as text, None for a run that never came to its end."""
+class Stored:
+    """A stored run. `result` is `result.json` as text, None for a run that never came to its end; `options` as stored,
+    the seed not among them."""
 
     outcome: str
     reason: str
     result: str | None
-    tries: int = 1
+    tries: int
+    scene: str
+    seed: int
+    options: Mapping[str, Any]
 
     @property
     def is_final(self) -> bool:
         """Has it come to its end, or been tried often enough?"""
         return self.outcome not in UNFINISHED or self.tries >= MAX_TRIES
-
-
-@dataclass(frozen=True)
-class Stored(Row):
-    """A stored run with what it was a run of: `options` as stored, the seed not among them."""
-
-    scene: str = ""
-    seed: int = 0
-    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 class SweepStore:
@@ -78,26 +73,29 @@ class SweepStore:
     ) -> None:
         self._connection.close()
 
-    def add(self, finished: Finished) -> None:
+    def add(self, finished: Finished) -> Stored:
         """Store a run, in place of an earlier one of the same job."""
         before = self.get(finished.job)
         tries = finished.tries + (before.tries if before is not None and before.outcome in UNFINISHED else 0)
-        row = (*_key(finished.job), finished.outcome, finished.reason, finished.result, tries)
+        outcome, reason, result = finished.outcome, finished.reason, finished.result
+        scene, seed, options = _key(finished.job)
         with self._refusing(), self._connection:
             self._connection.execute(
                 "INSERT OR REPLACE INTO runs (scene, seed, options, outcome, reason, result, tries)"
                 " VALUES (?, ?, ?, ?, ?, ?, ?)",
-                row,
+                (scene, seed, options, outcome, reason, result, tries),
             )
+        return Stored(outcome, reason, result, tries, scene, seed, json.loads(options))
 
-    def get(self, job: Job) -> Row | None:
+    def get(self, job: Job) -> Stored | None:
         """What is stored of a job."""
+        scene, seed, options = _key(job)
         with self._refusing():
             found = self._connection.execute(
                 "SELECT outcome, reason, result, tries FROM runs WHERE scene = ? AND seed = ? AND options = ?",
-                _key(job),
+                (scene, seed, options),
             ).fetchone()
-        return None if found is None else Row(*found)
+        return None if found is None else Stored(*found, scene=scene, seed=seed, options=json.loads(options))
 
     def everything(self) -> list[Stored]:
         """All that is stored, by scene and seed."""
@@ -110,7 +108,7 @@ class SweepStore:
             for outcome, reason, result, tries, scene, seed, options in found
         ]
 
-    def stored(self, jobs: Iterable[Job]) -> dict[Job, Row]:
+    def stored(self, jobs: Iterable[Job]) -> dict[Job, Stored]:
         """Those of the jobs that are stored."""
         found = {job: self.get(job) for job in jobs}
         return {job: row for job, row in found.items() if row is not None}

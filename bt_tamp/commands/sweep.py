@@ -109,6 +109,7 @@ def _run(jobs: "list[Job]", processes: int, store: "SweepStore") -> None:
 
     from bt_tamp.quiet import outliving_a_closed_pipe
     from bt_tamp.sweep import run_jobs
+    from bt_tamp.sweep_results import run_of
 
     console = Console(stderr=True)
     columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
@@ -118,12 +119,12 @@ def _run(jobs: "list[Job]", processes: int, store: "SweepStore") -> None:
         closing(run_jobs(jobs, min(processes, len(jobs)))) as arriving,
     ):
         task = bar.add_task("runs", total=len(jobs))
-        reached = 0
+        succeeded = 0
         for number, finished in enumerate(arriving, start=1):
-            store.add(finished)
+            stored = store.add(finished)
             bar.advance(task)
-            reached += finished.outcome == "goal_reached"
-            said = f"{number}/{len(jobs)} ({reached} reached) {_said(finished)}"
+            succeeded += run_of(stored).succeeded
+            said = f"{number}/{len(jobs)} ({succeeded} succeeded) {_said(finished)}"
             with outliving_a_closed_pipe(sys.stderr):
                 print(said, file=sys.stderr) if is_silent else bar.console.print(said, highlight=False, markup=False)
 

@@ -16,7 +16,7 @@ from bt_tamp.cli import main
 from bt_tamp.commands.sweep import seeds
 from bt_tamp.errors import UserError
 from bt_tamp.options import RunOptions
-from bt_tamp.report.result import RunResult
+from bt_tamp.report.result import Befallen, RunResult
 from bt_tamp.sweep import Finished, Job, patience, run_jobs
 from bt_tamp.sweep_store import SweepStore
 from bt_tamp.sweep_table import print_table, summaries
@@ -138,11 +138,30 @@ def test_the_table_counts_goals_takes_medians_and_names_failures(tmp_path: Path)
         rows = store.stored(map(job, range(5)))
 
     (one,) = summaries(rows)
-    assert (one.runs, one.reached, one.robot_s) == (4, 3, 20.0)
+    assert (one.runs, one.succeeded, one.robot_s) == (4, 3, 20.0)
     assert one.failures == ((3, "killed: gone"),)
     with (tmp_path / "table.txt").open("w") as file:
         print_table(Console(file=file, width=100), rows)
     assert "fig2, seed 3: killed: gone" in (tmp_path / "table.txt").read_text()
+
+
+def test_the_table_counts_the_right_verdict_where_the_goal_is_out_of_reach_and_tells_who_did_not_look(
+    tmp_path: Path,
+) -> None:
+    def done(replan: bool, reason: str) -> Finished:
+        options = RunOptions(seed=0, disturb=("taken-for-good",), replan=replan)
+        befell = Befallen(1.0, "taken-for-good", "cup was taken away for good", "", bodies=("cup",))
+        result = RunResult("fig2", 0, "no_plan", reason, {}, disturbances=(befell,))
+        return Finished(Job("fig2", options), "no_plan", reason, result.to_json())
+
+    runs = [done(True, "cup is nowhere to be seen"), done(False, "open loop: the fingers closed on nothing")]
+    with SweepStore(tmp_path / "s.db") as store:
+        stored = {run.job: store.add(run) for run in runs}
+
+    assert [(one.befell, one.succeeded) for one in summaries(stored)] == [
+        (("taken-for-good",), 1),
+        (("taken-for-good", "open loop"), 0),
+    ]
 
 
 def test_a_sweep_stores_real_runs_and_goes_on_only_when_told_to(
