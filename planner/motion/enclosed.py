@@ -3,6 +3,8 @@
 It is no proof, but evidence like that of the search itself.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from planner.motion.checking import CollisionChecker
@@ -30,7 +32,15 @@ LOOKS, LOOK = 30, 0.15
 """Steps of this length in rad whose ends tell what the walls are."""
 
 
-def enclosed_end(checker: CollisionChecker, query: Query) -> tuple[str, np.ndarray] | None:
+@dataclass(frozen=True)
+class EnclosedEnd:
+    """An end of a query, "start" or "goal", that there is no way out of: q (7,) in rad."""
+
+    which: str
+    q: np.ndarray
+
+
+def enclosed_end(checker: CollisionChecker, query: Query) -> EnclosedEnd | None:
     """The query's "start", or one "goal" if all are walled in, as a configuration (7,); None if there is a way out.
 
     Only the fast model is asked: the exact one would take longer than the search that it saves.
@@ -38,9 +48,9 @@ def enclosed_end(checker: CollisionChecker, query: Query) -> tuple[str, np.ndarr
     if not isinstance(checker, FastChecker):
         return None
     if _is_enclosed(checker, query.start, query):
-        return "start", query.start
+        return EnclosedEnd("start", query.start)
     if all(_is_enclosed(checker, goal, query) for goal in query.goals):
-        return "goal", query.goals[0]
+        return EnclosedEnd("goal", query.goals[0])
     return None
 
 

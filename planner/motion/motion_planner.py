@@ -13,7 +13,7 @@ from planner.failure import MotionFailure
 from planner.motion.blame import blame
 from planner.motion.checking import CollisionChecker
 from planner.motion.collision import FastChecker, hand_hits, part_names
-from planner.motion.enclosed import LOOKS, enclosed_end, walls_about
+from planner.motion.enclosed import LOOKS, EnclosedEnd, enclosed_end, walls_about
 from planner.motion.exact import Contact, ExactChecker
 from planner.motion.ik import ClosedFormIK
 from planner.motion.ik_numeric import track_numerically
@@ -216,22 +216,21 @@ class MotionPlanner:
         seed, ends = self._next_seed(), self.ends(scene, q_goals, allowed)
         if isinstance(ends, MotionFailure):
             return ends
-        walled_in = cache(lambda: self._walled_in(scene.without(movables(scene)), ends, seed))
-        is_enclosed = cache(lambda: self._enclosed(scene, ends, seed) is not None)
-
-        def hopeless() -> bool:
-            return walled_in() is not None or (bool(movables(scene)) and is_enclosed())
+        fixed = scene.without(movables(scene))
+        walled_in = cache(lambda: self._enclosed(fixed, ends, seed))
+        enclosed = cache(lambda: walled_in() or (self._enclosed(scene, ends, seed) if movables(scene) else None))
 
         risen = self._risen(scene, q_goals, ends, seed, max_checks)
         trajectory = None if risen is None else self._timed(scene, risen, ends.margins)
         if trajectory is not None:
             return trajectory
         for attempt in range(_ATTEMPTS):
-            path = self._polyline(scene, ends, seed + attempt, max_checks, hopeless)
-            if path is None:
+            path = self._polyline(scene, ends, seed + attempt, max_checks, lambda: enclosed() is not None)
+            if path is None and not ((end := enclosed()) and end.which == "goal"):
                 path = self._withdrawn(scene, ends, seed, max_checks)
             if path is None:
-                return walled_in() or self._blocked(scene, ends, seed, max_checks)
+                end = walled_in()
+                return self._walled_in(fixed, ends, end, seed) if end else self._blocked(scene, ends, seed, max_checks)
             trajectory = self._timed(scene, path, ends.margins)
             if trajectory is not None:
                 return trajectory
@@ -362,17 +361,13 @@ class MotionPlanner:
             return blame(f"{reason}; the way without movable bodies hits", contacts, movable)
         return self._timed(scene, path, ends.margins) or MotionFailure(reason)
 
-    def _walled_in(self, scene: SceneState, ends: Ends, seed: int) -> MotionFailure | None:
+    def _walled_in(self, scene: SceneState, ends: Ends, end: EnclosedEnd, seed: int) -> MotionFailure:
         """What there is no way out of, at the start or at every goal."""
-        end = self._enclosed(scene, ends, seed)
-        if end is None:
-            return None
-        which, q = end
         self.work.add("exact_checks", LOOKS)
-        walls = walls_about(self._exact(scene, ends.margins), q, self._limits, seed)
-        return MotionFailure(f"the {which} is walled in by {', '.join(walls) or 'the arm itself'}")
+        walls = walls_about(self._exact(scene, ends.margins), end.q, self._limits, seed)
+        return MotionFailure(f"the {end.which} is walled in by {', '.join(walls) or 'the arm itself'}")
 
-    def _enclosed(self, scene: SceneState, ends: Ends, seed: int) -> tuple[str, np.ndarray] | None:
+    def _enclosed(self, scene: SceneState, ends: Ends, seed: int) -> EnclosedEnd | None:
         """See `enclosed_end`."""
         checker, reached = self._checker(scene, ends)
         # A copy, because whoever searches with this model counts its checks.
