@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from bt_tamp.sweep_results import Run
+from bt_tamp.sweep_results import Run, naming
 
 OPEN_LOOP = "open loop: "
 BODY = "a body"
@@ -30,9 +30,10 @@ def kinds_of_failure(runs: Sequence[Run]) -> list[Kind]:
 
 def _gist(run: Run) -> str:
     why = re.sub(r"\([^()]*\)", "", run.reason.removeprefix(OPEN_LOOP))
-    bodies = sorted(run.result.places if run.result is not None else (), key=len, reverse=True)
-    if bodies:
-        why = re.sub(rf"(?<![\w-])({'|'.join(map(re.escape, bodies))})(?![\w-])", BODY, why)
+    if run.result is not None and run.result.places:
+        why = naming(run.result.places).sub(BODY, why)
     why = re.sub(r"-?\b\d+(\.\d+)?", "…", why)
+    # Which side of a limit it was on when the arm stopped is a matter of one reading.
+    why = re.sub(r"\b(near|beyond) the safety limit", "at the safety limit", why)
     outcome = run.outcome.replace("_", " ")
     return f"{outcome}: {why}" if why else outcome

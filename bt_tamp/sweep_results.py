@@ -73,8 +73,7 @@ class Run:
         return [name for one in hopeless for name in one.bodies]
 
     def _names(self, body: str) -> bool:
-        """Does the reason speak of a body, not only of another whose name holds its name?"""
-        return re.search(rf"(?<![\w-]){re.escape(body)}(?![\w-])", self.reason) is not None
+        return naming([body]).search(self.reason) is not None
 
 
 @dataclass(frozen=True)
@@ -128,6 +127,12 @@ def run_of(row: Stored) -> Run:
         choices=shlex.join(words(row.options, leaving=("disturb", "replan"))),
         digest=str(row.options.get("digest", "")),
     )
+
+
+def naming(bodies: Iterable[str]) -> re.Pattern[str]:
+    """What finds the names of bodies in a sentence: not those that only hold such a name, nor "can't" for a can."""
+    longest_first = sorted(bodies, key=len, reverse=True)
+    return re.compile(rf"(?<![\w-])(?:{'|'.join(map(re.escape, longest_first))})(?![\w'-])")
 
 
 def wilson(succeeded: int, runs: int) -> tuple[float, float]:

@@ -8,6 +8,7 @@ number of times; infeasible is only called what follows from proofs.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
@@ -245,8 +246,11 @@ class SearchThenSample:
         """What the task planner says, its own failure or a plan that doesn't work taken for finding none."""
         try:
             found = self._task_planner.solve(domain, problem, self._settings.max_expansions)
-            if not isinstance(found, TaskPlan | NoTaskPlan) or not isinstance(found.expansions, int):
+            if not isinstance(found, TaskPlan | NoTaskPlan):
                 return NoTaskPlan(False, 0, f"it answered {found!r}")
+            if not isinstance(found.expansions, Integral):
+                return NoTaskPlan(False, 0, f"its expansions are {found.expansions!r}, expected a whole number")
+            found = replace(found, expansions=int(found.expansions))
             wrong = flaw(found, stated.init, stated.goal) if isinstance(found, TaskPlan) else None
         except PddlError:
             raise

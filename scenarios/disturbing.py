@@ -7,7 +7,7 @@ import numpy as np
 from pinocchio import SE3
 
 from scenarios import schema
-from scenarios.checks import Problem, immovable, lies_off
+from scenarios.checks import Problem, immovable, key_of, lies_off
 from scenarios.disturbance import (
     Bring,
     Disorder,
@@ -26,9 +26,9 @@ from scenarios.goal import GoalError, resolved_goal
 from scenarios.names import TABLE, known
 from scenarios.placing import body_frame, heights_of
 from scenarios.robots import ROBOTS
-from scenarios.scenario import Body, Scenario
-from scenarios.schema_disturbances import HAPPENINGS, Entry
-from scenarios.schema_parts import Pose, PoseOn
+from scenarios.scenario import Scenario
+from scenarios.schema_disturbances import HAPPENINGS, BroughtObject, Entry
+from scenarios.schema_parts import PoseOn
 from scenarios.solids import body_solid
 from scenarios.standing import overlap_problem
 
@@ -63,8 +63,8 @@ def disturbance_problems(file: schema.SceneFile, scenario: Scenario) -> Iterator
             yield (*path, "link"), f"unknown link {entry.push.link!r}, {known(entry.push.link, links)}"
         if entry.push is not None and entry.push.link == facts.base:
             yield (*path, "link"), f"link {facts.base!r} doesn't move: it stands on the floor"
-        if entry.bring is not None and entry.bring.pose is not None and name in scenario.bodies:
-            yield from _ill_placed(scenario, scenario.bodies[entry.bring.object], entry.bring.pose, path)
+        if entry.bring is not None and name in scenario.bodies:
+            yield from _ill_placed(file, scenario, entry.bring, path)
         if entry.goal is not None:
             try:
                 _goal(entry.goal, scenario)
@@ -72,8 +72,15 @@ def disturbance_problems(file: schema.SceneFile, scenario: Scenario) -> Iterator
                 yield path, str(error)
 
 
-def _ill_placed(scenario: Scenario, body: Body, pose: Pose | PoseOn, path: KeyPath) -> Iterator[Problem]:
+def _ill_placed(file: schema.SceneFile, scenario: Scenario, bring: BroughtObject, path: KeyPath) -> Iterator[Problem]:
     """What is brought onto nothing known, beside the surface that it is to lie on, or into what never moves."""
+    body, pose = scenario.bodies[bring.object], bring.pose
+    if pose is None:
+        # What is there at the start is looked at with everything else.
+        problem = overlap_problem(body_solid(body), immovable(scenario)) if body.name in scenario.late else None
+        if problem is not None:
+            yield (*key_of(file, body.name), "pose"), f"{body.name!r} {problem}"
+        return
     if isinstance(pose, PoseOn) and pose.on not in (surfaces := {TABLE, *scenario.regions}):
         yield (*path, "pose", "on"), f"unknown surface {pose.on!r}, {known(pose.on, surfaces)}"
         return

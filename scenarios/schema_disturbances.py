@@ -24,7 +24,7 @@ class MovedObject(Part):
 
     @model_validator(mode="after")
     def _is_put_elsewhere(self) -> "MovedObject":
-        if not any(self.by) and not any(self.turn_deg):
+        if not any(self.by) and not any(angle % 360.0 for angle in self.turn_deg):
             raise problem("", "nothing is moved, expected `by` or `turn_deg`")
         return self
 
@@ -48,6 +48,12 @@ class ShiftedRegion(Part):
     region: str
     by: Position = Field(description="Shift in W, metres.")
 
+    @model_validator(mode="after")
+    def _is_put_elsewhere(self) -> "ShiftedRegion":
+        if not any(self.by):
+            raise problem("by", "shifts nothing, expected a length other than 0")
+        return self
+
 
 class Push(Part):
     """Someone pushes the arm."""
@@ -55,6 +61,12 @@ class Push(Part):
     force: Force = Field(description="In W, newtons.")
     seconds: Lasting
     link: str | None = Field(default=None, description="One of the robot's links; without: the tool centre.")
+
+    @model_validator(mode="after")
+    def _pushes(self) -> "Push":
+        if not any(self.force):
+            raise problem("force", "pushes nothing, expected a force other than 0")
+        return self
 
 
 class WeakGrip(Part):

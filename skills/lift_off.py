@@ -15,7 +15,7 @@ DURATION = 1.0
 PATIENCE = 2.0
 """Seconds after which the arm counts as stopped, wherever it is."""
 
-UNBORNE = 0.3
+PUSHED = 0.3
 """Seconds for which an arm that was stopped by a push bears only what it bore before, then all that weighs on it."""
 
 STEPS = 25
@@ -52,7 +52,7 @@ class LiftOff(Behaviour):
             if waited > 0.0:
                 self._begin()
             return Status.RUNNING
-        if controller.stopped is not None and waited > UNBORNE:
+        if controller.stopped is not None and waited > PUSHED:
             controller.acknowledge()
         return Status.SUCCESS if controller.finished or waited > PATIENCE else Status.RUNNING
 

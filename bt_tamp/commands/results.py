@@ -44,7 +44,7 @@ def call(arguments: argparse.Namespace) -> int:
         raise UserError(f"{arguments.store}: holds no runs")
     made = [] if arguments.out is None else _export(arguments.out, found, runs)
     _print(found, runs)
-    _print_failures(runs)
+    _print_failures(runs, is_exported=arguments.out is not None)
     for path in made:
         print(path)
     return 0
@@ -90,7 +90,7 @@ def _print(found: "list[Line]", runs: "list[Run]") -> None:
         console.print(told, highlight=False)
 
 
-def _print_failures(runs: "list[Run]") -> None:
+def _print_failures(runs: "list[Run]", is_exported: bool) -> None:
     from rich.text import Text
 
     from bt_tamp.sweep_failures import OPEN_LOOP, kinds_of_failure
@@ -104,7 +104,8 @@ def _print_failures(runs: "list[Run]") -> None:
             reason = run.reason.removeprefix(OPEN_LOOP)
             console.print(Text(f"    {run.command}\n        {reason}"), soft_wrap=True)
         if len(kind.runs) > SHOWN:
-            print(f"    and {len(kind.runs) - SHOWN} more: --out DIR writes the commands of all to runs.csv")
+            where = "their commands stand in runs.csv" if is_exported else "--out DIR writes their commands to runs.csv"
+            print(f"    and {len(kind.runs) - SHOWN} more: {where}")
 
 
 def _shown(value: float | None) -> str:

@@ -144,7 +144,7 @@ def _closing(result: "RunResult") -> str:
     for name, place in sorted(result.places.items()):
         by_place.setdefault(place, []).append(name)
     lying = [f"{_listed(names)} {_where(place, len(names) > 1)}" for place, names in sorted(by_place.items())]
-    return f"{said}: {', '.join(lying)}."
+    return f"{said}: {', '.join(lying)}." if lying else f"{said}."
 
 
 def _listed(names: list[str]) -> str:

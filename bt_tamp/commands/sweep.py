@@ -58,7 +58,8 @@ def call(arguments: argparse.Namespace) -> int:
     """Run what isn't stored yet, then print the table."""
     jobs = _jobs(arguments)
 
-    from bt_tamp.errors import UserError
+    from bt_tamp.errors import UserError, refusing
+    from bt_tamp.sweep_results import runs_of
     from bt_tamp.sweep_store import SweepStore
     from bt_tamp.sweep_table import print_table, table_console
 
@@ -66,6 +67,8 @@ def call(arguments: argparse.Namespace) -> int:
         stored = store.stored(jobs)
         if stored and not arguments.resume:
             raise UserError(f"{arguments.store}: holds {len(stored)} of these runs already; --resume goes on with it")
+        with refusing(ValueError, about=str(arguments.store)):
+            runs_of(stored.values())
         left = [job for job in jobs if job not in stored or not stored[job].is_final]
         stop_on_signals()
         try:

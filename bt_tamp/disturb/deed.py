@@ -37,6 +37,9 @@ WORKSPACE = (0.42, 0.78)
 CAUGHT = 0.03
 """Metres by which the middle of what falls must be inside the edge of what it falls on."""
 
+ON_TOP = 0.005
+"""Metres between the table's top and what stands on it."""
+
 FALLS = 9
 """Moments at which it is looked where something would fall."""
 
@@ -160,11 +163,17 @@ class Occasion:
     def stands_free(self, body: Body, X_WO: SE3, soon: Sequence[np.ndarray] = ()) -> bool:
         """Can a body be put at X_WO without overlapping anything, the arm and what it holds included, where that is now
         and at `soon` (7,) as well?"""
+        return not self.is_taken(body, X_WO) and self._is_clear(body, X_WO, soon)
+
+    def is_taken(self, body: Body, X_WO: SE3) -> bool:
+        """Would a body at X_WO overlap anything but the arm?"""
         around = [
             body_solid(self.scenario.bodies[name], X) for name, X in self.truth.poses.items() if name != body.name
         ]
-        if overlap_problem(body_solid(body, X_WO), [*immovable(self.scenario), *around]) is not None:
-            return False
+        return overlap_problem(body_solid(body, X_WO), [*immovable(self.scenario), *around]) is not None
+
+    def _is_clear(self, body: Body, X_WO: SE3, soon: Sequence[np.ndarray]) -> bool:
+        """Does a body at X_WO keep clear of the arm and what that holds, where it is now and at `soon` (7,)?"""
         scene = self.scene
         if scene.held is not None and scene.held.name == body.name:
             scene = replace(scene, held=None)
@@ -193,6 +202,11 @@ class Occasion:
         X_WO, reach = SE3(rotation, np.array([*p, z])), np.linalg.norm(p - self.scenario.robot.X_WB.translation[:2])
         is_good = self.is_on_table(p, 0.0) and WORKSPACE[0] < reach < WORKSPACE[1] and self.stands_free(body, X_WO)
         return X_WO if is_good else None
+
+    def is_on_top(self, body: Body, X_WO: SE3) -> bool:
+        """Does a body at X_WO stand on the table's top?"""
+        height = float(X_WO.translation[2]) - depth_below(body.shape, X_WO.rotation) - self.table_height()
+        return abs(height) < ON_TOP and self.is_on_table(X_WO.translation[:2], 0.0)
 
     def is_on_table(self, p: np.ndarray, margin: float) -> bool:
         """Does a point (2,) lie at least `margin` metres inside the table's edges?"""

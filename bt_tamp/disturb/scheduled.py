@@ -22,6 +22,9 @@ from scenarios.disturbance import (
 from sim.robot_faults import WeakGrip
 from sim.world_faults import BinShifted, Brought, Moved, TakenAway
 
+BESIDE = (0.0, 0.2)
+"""Metres from where the arm is in its way within which what is brought is put down."""
+
 
 def drawing(happening: Happening) -> Draw:
     """What does it, when its moment has come."""
@@ -44,9 +47,7 @@ def _deed(happening: Happening, now: Occasion) -> Deed | None:
                 else None
             )
         case Bring(name, X_WO):
-            if name in there or not now.stands_free(now.scenario.bodies[name], X_WO):
-                return None
-            return Deed(f"{name} appeared", (Brought(start=t, name=name, X_WO=X_WO),), names=(name,))
+            return None if name in there else _brought(now, name, X_WO)
         case ShiftRegion(region, by):
             said = f"{region} was shifted by {_centimetres(by)}"
             return Deed(said, (BinShifted(start=t, region=region, by=by),), names=(region,))
@@ -65,11 +66,27 @@ def _deed(happening: Happening, now: Occasion) -> Deed | None:
             return Deed(f"what was wanted from then on: {said}", goal=wanted)
 
 
+def _brought(now: Occasion, name: str, X_WO: SE3) -> Deed | None:
+    """A body is put down at X_WO, or beside it where the arm is in the way: that may be waiting for just this body."""
+    body, sentence = now.scenario.bodies[name], f"{name} appeared"
+    spot: SE3 | None = X_WO
+    if now.is_taken(body, X_WO):
+        return None
+    if not now.stands_free(body, X_WO):
+        spot = now.spot(body, X_WO.rotation, X_WO.translation[:2], BESIDE) if now.is_on_top(body, X_WO) else None
+        sentence += ", beside where it was to be: the arm was there"
+    return None if spot is None else Deed(sentence, (Brought(start=now.t, name=name, X_WO=spot),), names=(name,))
+
+
 def _moved(by: tuple[float, float, float], rpy: tuple[float, float, float]) -> str:
-    turn = f"turned by {np.degrees(np.linalg.norm(pin.log3(pin.rpy.rpyToMatrix(*rpy)))):.0f}°" if any(rpy) else ""
+    turn = f"turned by {_brief(np.degrees(np.linalg.norm(pin.log3(pin.rpy.rpyToMatrix(*rpy)))))}°" if any(rpy) else ""
     shift = f"moved by {_centimetres(by)}" if any(by) else ""
     return " and ".join(part for part in (shift, turn) if part)
 
 
 def _centimetres(by: tuple[float, float, float]) -> str:
-    return f"{100 * np.linalg.norm(by):.0f} cm"
+    return f"{_brief(100 * float(np.linalg.norm(by)))} cm"
+
+
+def _brief(value: float) -> str:
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"

@@ -84,10 +84,11 @@ class RunResult:
 
     goal: literal → does it hold at the end. plan: actions of the last plan; executed: actions that were done, in order,
     and executed_s: how long each took. disturbances: what befell it. learned: sentences. places: where each movable
-    body lies at the end (a region's name, "table", "hand", "floor", "elsewhere", or "nowhere" to be seen). reason: why
-    it ended so, one sentence. planning_cpu_s counts all rounds and re-refinements, children included. robot_s is
-    simulated, wall_s real time. peak_contact_force_n: what the controller felt along the normal; peak_force_n: the
-    engine's true net force of any one thing on the arm and what it holds (what both fingers squeeze cancels out).
+    body that was ever there lies at the end (a region's name, "table", "hand", "floor", "elsewhere", or "nowhere" to be
+    seen). reason: why it ended so, one sentence. planning_cpu_s counts all rounds and re-refinements, children
+    included. robot_s is simulated, wall_s real time. peak_contact_force_n: what the controller felt along the normal;
+    peak_force_n: the engine's true net force of any one thing on the arm and what it holds (what both fingers squeeze
+    cancels out).
     unlawful_commands: those with a torque beyond its limit, or none at all (NaN). energy_j is ∫|τ·q̇|dt.
     reproducible: no wall-clock watchdog cut anything short.
     """

@@ -2,7 +2,7 @@
 
 from bt_tamp.report.events import Event
 
-GONE_ON = "gone on from where another run ended, whose disturbances don't come again"
+GONE_ON = "gone on from where another run ended; nothing that was to befall that one comes again"
 
 
 def sentence(event: Event) -> str | None:

@@ -27,7 +27,7 @@ def story(events: Iterable[Event], result: RunResult | None) -> str:
 class _Teller:
     def __init__(self) -> None:
         self.lines: list[str] = []
-        self._plans = 0
+        self._plans, self._has_begun = 0, False
         self._proposed: list[str] | None = None
         self._is_planning = False
         self._started: dict[str, float] = {}
@@ -53,6 +53,7 @@ class _Teller:
         self._heading(f"{data['scene']}, seed {data['seed']} ({noise}){told}")
 
     def _round(self, event: Event, data: Any) -> None:
+        self._waits_since = None
         if not self._is_planning:
             self._proposed = None
             self._begin_planning(event.t)
@@ -68,7 +69,7 @@ class _Teller:
 
     def _begin_planning(self, t: float) -> None:
         self._is_planning = True
-        self._heading(f"Planning, at {t:.1f} s" if self._plans else "Planning before anything is done")
+        self._heading(f"Planning, at {t:.1f} s" if self._has_begun else "Planning before anything is done")
 
     def _proof_sought(self, event: Event, data: Any) -> None:
         failed = planner_failed(event)
@@ -102,11 +103,11 @@ class _Teller:
         self._say(f"A way was found to do all of it: {steps}{along}; {counted(data['rounds'], 'round')}.", "  - ")
 
     def _plan_installed(self, event: Event, data: Any) -> None:
-        self._plans += 1
-        self._is_planning, self._waits_since = False, None
+        self._is_planning, self._has_begun, self._waits_since = False, True, None
         if not data["actions"]:
             self._heading("What was done")
             return
+        self._plans += 1
         self._heading(f"Plan {self._plans}, in force from {event.t:.1f} s")
         for number, action in enumerate(data["actions"], start=1):
             self._say(action, f"  {number:2}. ")
@@ -145,6 +146,7 @@ class _Teller:
             where = f" in its phase {self._phases[-1]!r}" if self._phases else ""
             self._say(f"{self._running} was broken off{where}.", f"{event.t:7.1f} s          ")
             self._running = None
+        self._waits_since = None
         reason = "" if data["reason"] == self._last_failure else f": {data['reason']}"
         self._say(f"The plan was dropped{reason}. A new one was sought from what was observed then.")
 
@@ -154,7 +156,7 @@ class _Teller:
 
     def _disturbed(self, event: Event, data: Any) -> None:
         during = f"{data['action']} in its phase {data['phase']!r}" if data.get("action") else repr(data["phase"])
-        if not self._plans and not self._is_planning:
+        if not self._has_begun and not self._is_planning:
             self._begin_planning(event.t)
         meanwhile = ", while planning" if data["phase"] == "planning" else f", during {during}"
         self._say(f"DISTURBANCE{meanwhile}: {data['sentence']}.", f"{event.t:7.1f} s          ")
@@ -164,7 +166,7 @@ class _Teller:
 
     def _missing(self, event: Event, data: Any) -> None:
         names = ", ".join(data["bodies"])
-        self._waits_since = event.t
+        self._waits_since = event.t if self._waits_since is None else self._waits_since
         self._say(f"The arm waited for {names} to turn up again.", f"{event.t:7.1f} s          ")
 
     def _waiting(self, event: Event, data: Any) -> None:

@@ -312,7 +312,7 @@ class ArmController:
         self.stopped = reason
         self._begin_hold(state)
         if isinstance(reason, Collision | ForceTooHigh):
-            # Hold here, bearing only what had to be borne before: what pushes isn't pushed back against.
+            # Hold here, as stiffly as ever; but what came up suddenly is borne by no compensation.
             self._course = Course(Trajectory.standstill(state.q))
             self._unexplained = self._observer.unmodelled - self._observer.sudden
 

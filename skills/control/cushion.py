@@ -8,7 +8,7 @@ from sim.robot import RobotModel
 from skills.control.state import ArmState
 
 FREELY = 0.5
-"""Share of a joint's speed limit up to which it gives way freely."""
+"""Share of a joint's speed limit up to which the arm's law alone says how it moves."""
 
 BRAKING = 80.0
 """1/s with which what is beyond that is braked: stable at 500 Hz, and with joint states that come 10 ms late."""

@@ -30,8 +30,11 @@ SENSOR_PATIENCE = 0.02
 """Seconds without a wrist reading after which force control is blind."""
 
 
-def _held_against(value: float, limit: float) -> str:
-    return f"{'near' if value < limit else 'beyond'} the safety limit of"
+def _held_against(value: float, limit: float, digits: int) -> str:
+    """The value beside its limit, compared as they are printed."""
+    shown, bound = f"{value:.{digits}f}", f"{limit:.{digits}f}"
+    where = "at" if shown == bound else "near" if value < limit else "beyond"
+    return f"{where} the safety limit of {bound}"
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ class ForceTooHigh:
     limit: float
 
     def __str__(self) -> str:
-        return f"{self.force:.0f} N of contact force, {_held_against(self.force, self.limit)} {self.limit:.0f} N"
+        return f"{self.force:.0f} N of contact force, {_held_against(self.force, self.limit, 0)} N"
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ class TooFast:
     limit: float
 
     def __str__(self) -> str:
-        return f"the hand moved at {self.speed:.2f} m/s, {_held_against(self.speed, self.limit)} {self.limit:.2f} m/s"
+        return f"the hand moved at {self.speed:.2f} m/s, {_held_against(self.speed, self.limit, 2)} m/s"
 
 
 @dataclass(frozen=True)
@@ -93,14 +96,14 @@ Stop = ForceTooHigh | TooFast | TorqueSpent | Collision | SensorLost
 
 @dataclass(frozen=True)
 class SafetyLimits:
-    """contact_force: N, of the wrench at the wrist that weight doesn't explain. speed: m/s of the tool centre.
+    """speed: m/s of the tool centre. contact_force: N, of the wrench at the wrist that weight doesn't explain.
     collision (7,): Nm on each joint that come up suddenly and neither model nor wrist sensor explains. Ordinary
     work stays below 3 Nm; 1 Nm of joint friction, masses 20 % wrong and a sensor 4 ms late below 10 on joint 2
     (when the weight is first felt) and 4 on the others. A joint that rubs with 3 Nm turns round by 6; what meets
     the hand is felt at the wrist before."""
 
+    speed: float
     contact_force: float = 60.0
-    speed: float = 2.5
     collision: np.ndarray = field(default_factory=lambda: np.array([8.0, 14.0, 7.5, 8.0, 7.5, 7.5, 7.5]))
 
 

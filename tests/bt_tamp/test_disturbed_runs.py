@@ -13,6 +13,8 @@ from bt_tamp.report.result import RunResult
 from scenarios.library import scenario_path
 from scenarios.load import load_scenario
 
+CAN = "{cylinder: {radius: 0.033, height: 0.12}}"
+
 DECLARED = """
 disturbances:
   - {at: 0.1, move: {object: cube, by: [0.0, 0.03, 0.0]}}
@@ -159,6 +161,16 @@ def test_a_stroke_is_blocked_while_it_presses_and_nothing_else_is(scene, phase, 
     assert main(run) == 12
     (blocked,) = RunResult.from_json((tmp_path / "run" / "result.json").read_text()).disturbances
     assert (blocked.phase, blocked.answer) == (phase, "action_failed")
+
+
+def test_what_is_brought_back_where_the_arm_waits_for_it_is_put_beside_it(tmp_path):
+    text = scenario_path("fig3").read_text().replace("{box: [0.16, 0.22, 0.03]}", CAN)
+    declared = "disturbances: [{at: 0.6, take: {object: box}}, {at: 5, bring: {object: box}}]\n"
+    (tmp_path / "scene.yaml").write_text(text + declared)
+    main(["run", str(tmp_path / "scene.yaml"), "--max-sim-time", "7", "--out", str(tmp_path / "run")])
+    _, back = RunResult.from_json((tmp_path / "run" / "result.json").read_text()).disturbances
+    assert back.t < 5.1
+    assert back.sentence == "box appeared, beside where it was to be: the arm was there"
 
 
 def test_the_story_tells_that_the_arm_waited_for_what_is_gone(tmp_path, capsys):

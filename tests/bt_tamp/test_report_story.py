@@ -67,13 +67,30 @@ def test_the_story_of_a_run_that_goes_on_tells_its_options_what_was_skipped_and_
     interrupted = RunResult("desk", 0, "interrupted", "the run was interrupted, the arm brought to rest", {})
     told = " ".join(story(events, interrupted).split())
     for expected in (
-        "desk, seed 0 (gone on from where another run ended, whose disturbances don't come again), --contact impedance",
+        "desk, seed 0 (gone on from where another run ended; nothing that was to befall that one comes again)",
+        "comes again), --contact impedance",
         "1.0 s Skipped, as it was done already: pick(book, table), place(book, crate).",
         "2.0 s To be done again, as holding(book) did not hold: pick(book, table).",
         "Before its end the run was interrupted, the arm brought to rest.",
     ):
         assert expected in told
     assert sentence(events[1]) == "skipped, as it is done already: pick(book, table), place(book, crate)"
+
+
+def test_the_story_numbers_the_plans_that_had_something_to_do_and_tells_of_waiting_only_while_it_lasted() -> None:
+    def installed(t: float, *actions: str) -> list[Event]:
+        proposed = {"round": 1, "plan": list(actions), "failure": ""}
+        return [Event("round", t, proposed), Event("plan_installed", t, {"actions": list(actions)})]
+
+    gone = [Event("missing", 3.0, {"bodies": ["can"]}), Event("missing", 4.0, {"bodies": ["can"]})]
+    again = Event("replan", 5.0, {"reason": "can is wanted now, too"})
+    events = [*installed(0.0, *FIRST), *installed(2.0), *gone]
+    end = RunResult("desk", 0, "no_plan", "can is nowhere to be seen", {})
+    assert "The arm had waited in vain since 3.0 s." in story(events, end)
+    told = story([*events, again, *installed(5.0, *FIRST)], end)
+    assert "waited in vain" not in told
+    assert "Plan 2, in force from 5.0 s" in told
+    assert told.count("Planning before anything is done") == 1
 
 
 def test_an_event_that_lacks_something_is_named_in_one_line(tmp_path, capsys) -> None:

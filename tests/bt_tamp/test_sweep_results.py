@@ -86,6 +86,7 @@ def test_where_the_goal_cannot_be_reached_the_right_verdict_is_the_success(store
         "no plan within 20 rounds: pick(cup, table) doesn't work as cup lies",
         "bookend is nowhere to be seen",
         "book-end is nowhere to be seen",
+        "there is no way to box: the book's cover is in the way",
         "",
     ],
 )
@@ -223,6 +224,25 @@ def test_runs_that_failed_alike_are_told_together_with_the_first_commands(store,
     assert said.count("--disturb rotated --no-replan pick(cup_") == 3
     assert "and 2 more" in said
     assert (tmp_path / "runs.csv").read_text().count("--disturb rotated --no-replan") == 5
+
+
+def test_a_limit_touched_from_either_side_is_one_kind_of_failure(store, capsys):
+    with SweepStore(store) as opened:
+        for seed, (force, where) in enumerate([(46, "near"), (60, "at"), (101, "beyond")]):
+            reason = f"open loop: pick(box, table) failed: {force} N of contact force, {where} the safety limit of 60 N"
+            opened.add(finished(seed, 8.0, ("rotated",), "gave_up", reason, replan=False))
+    assert main(["results", str(store)]) == 0
+    assert "open loop, 3 × gave up: pick failed" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_stored_run_that_cannot_be_read_is_told_by_sweep_and_results_alike(tmp_path, capsys):
+    sweep = ["sweep", "fig2", "--seeds", "0:1", "--max-sim-time", "0.1", "--jobs", "1", "--store", str(tmp_path / "s")]
+    assert main(sweep) == 0
+    with sqlite3.connect(tmp_path / "s") as connection:
+        connection.execute("UPDATE runs SET result = '{}'")
+    for command in ([*sweep, "--resume"], ["results", str(tmp_path / "s")]):
+        assert main(command) == 2
+        assert "not a run's result" in capsys.readouterr().err
 
 
 def test_a_store_that_is_not_there_is_refused(tmp_path, capsys):

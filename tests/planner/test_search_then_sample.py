@@ -265,6 +265,32 @@ class Stubborn:
         return self.plan
 
 
+class Counting:
+    """A task planner that tells its expansions in its own way."""
+
+    def __init__(self, told):
+        self.told = told
+
+    def solve(self, domain_text, problem_text, max_expansions):
+        found = PyperplanPlanner().solve(domain_text, problem_text, max_expansions)
+        return replace(found, expansions=self.told)
+
+
+@pytest.mark.parametrize(("told", "is_believed"), [(np.int64(7), True), (2.5, False), ("many", False)])
+def test_a_task_planner_may_count_with_any_whole_number(tabletop, stand_in, told, is_believed):
+    heard = []
+    loop = SearchThenSample(
+        Counting(told),
+        dict.fromkeys(PRIMITIVES, stand_in(rule())),
+        DOMAIN,
+        PlanSettings(tries=5, widenings=0),
+        lambda kind, data: heard.append(data),
+    )
+    outcome = loop.plan(tabletop("cup"), goal_facts(CUP_AWAY), np.random.default_rng(0), Work())
+    assert isinstance(outcome, Solution) is is_believed
+    assert any(f"its expansions are {told!r}, expected" in data.get("failure", "") for data in heard) is not is_believed
+
+
 def test_a_failing_plan_is_not_repeated_without_end(tabletop, stand_in):
     skill = stand_in(rule(pick_cup=lambda sample, scene: {"mug"}))
     loop = SearchThenSample(

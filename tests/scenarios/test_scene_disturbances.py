@@ -66,6 +66,12 @@ def test_what_is_taken_before_it_is_brought_back_is_there_at_the_start():
         read("{at: 1, take: {object: tin}}", BRINGS)
 
 
+def test_what_is_brought_to_its_declared_pose_must_have_room_there():
+    sunk = SCENE.replace("{on: table, xy: [0.6, 0.0]}, noise", "{xyz: [0.6, 0.0, 0.05]}, noise")
+    with pytest.raises(SceneInvalid, match=r"objects\.tin\.pose, line 9: 'tin' overlaps 'table'"):
+        build_scenario(parse_document(f"{sunk}  - {BRINGS}\n", "scene.yaml"))
+
+
 def test_a_goal_may_be_clear_table_from_then_on():
     found = read(BRINGS, "{at: 6, goal: clear-table}").disturbances
     assert found[1].happening == NewGoal("(and (put_away cup) (put_away tin))")
@@ -80,7 +86,7 @@ def test_disturbances_that_are_no_list_are_refused():
     ("entry", "complaint"),
     [
         ("{at: 1, take: {object: cap}}", "unknown object 'cap', did you mean 'cup'"),
-        ("{at: 1, shift: {region: table, by: [0, 0, 0]}}", "unknown region 'table'"),
+        ("{at: 1, shift: {region: table, by: [0, 0.1, 0]}}", "unknown region 'table'"),
         ("{at: 1, push: {force: [1, 0, 0], seconds: 1, link: elbow}}", "unknown link 'elbow'"),
         ("{at: 1, push: {force: [1, 0, 0], seconds: 1, link: link_0}}", "link 'link_0' doesn't move"),
         ("{at: 1, bring: {object: tin, pose: {on: shelf, xy: [0, 0]}}}", "unknown surface 'shelf'"),
@@ -88,6 +94,9 @@ def test_disturbances_that_are_no_list_are_refused():
         ("{at: 1, bring: {object: tin, pose: {on: table, xy: [5, 0]}}}", "lies off 'table'"),
         ("{at: 1, bring: {object: tin, pose: {xyz: [0.6, 0, 0.05]}}}", "'tin' overlaps 'table'"),
         ("{at: 1, move: {object: cup}}", "nothing is moved, expected `by` or `turn_deg`"),
+        ("{at: 1, move: {object: cup, turn_deg: [0, 0, 360]}}", "nothing is moved, expected `by` or `turn_deg`"),
+        ("{at: 1, shift: {region: crate, by: [0, 0, 0]}}", "shifts nothing, expected a length other than 0"),
+        ("{at: 1, push: {force: [0, 0, 0], seconds: 1}}", "pushes nothing, expected a force other than 0"),
         ("{at: 1, disorder: {what: pose-delay, seconds: 1}}", "pose-delay has no size, expected `size`"),
         ("{at: 1, disorder: {what: pose-missing, size: 1, seconds: 1}}", "pose-missing has none, expected no size"),
         ("{phase: lift, nth: 1.5, take: {object: cup}}", "expected a whole number, got 1.5"),

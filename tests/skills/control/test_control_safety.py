@@ -32,7 +32,7 @@ ALLOWED = np.array([0.0, -40.0, 0.0, 0.0, 0.0, 0.0])
 
 def strict(rig, **limits):
     """The rig's controller anew, with other safety limits."""
-    rig.controller = ArmController(rig.robot, PERIOD, SafetyLimits(**limits))
+    rig.controller = ArmController(rig.robot, PERIOD, SafetyLimits(**{"speed": rig.robot.tcp_speed_max, **limits}))
     rig.run(0.05)
     return rig
 
@@ -246,7 +246,7 @@ def test_in_free_motion_a_silent_sensor_changes_nothing(lab):
 
 
 def test_one_odd_reading_stops_nothing():
-    guard = Guard(SafetyLimits(contact_force=60.0), np.full(7, 100.0), PERIOD)
+    guard = Guard(SafetyLimits(speed=2.5, contact_force=60.0), np.full(7, 100.0), PERIOD)
 
     def pushed(wrench):
         return guard.look(np.zeros(6), wrench, STILL, STILL, False)
@@ -265,7 +265,10 @@ def test_one_odd_reading_stops_nothing():
 
 @pytest.mark.parametrize(("force", "is_pressed", "is_stop"), [(50, False, True), (50, True, False), (56, True, True)])
 def test_a_force_that_is_regulated_may_come_nearer_to_the_limit_than_a_blow(force, is_pressed, is_stop):
-    guard, wrench = Guard(SafetyLimits(), np.full(7, 100.0), PERIOD), np.array([0.0, 0.0, force, 0.0, 0.0, 0.0])
+    guard, wrench = (
+        Guard(SafetyLimits(speed=2.5), np.full(7, 100.0), PERIOD),
+        np.array([0.0, 0.0, force, 0.0, 0.0, 0.0]),
+    )
     stops = [guard.look(np.zeros(6), wrench, STILL, STILL, is_pressed) for _ in range(3)]
     assert (stops[-1] is not None) == is_stop
 
