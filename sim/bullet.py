@@ -42,6 +42,11 @@ turning on the spot, that of a round patch 9 mm across (two thirds of its radius
 what is held would swing. PyBullet's wrist sensor leaves these torques out, some 0.1 Nm: forces are felt rightly, so a
 load's mass is, but not where its centre lies."""
 
+ARM_STIFFNESS, ARM_DAMPING = 2e4, 60.0
+"""N/m and N s/m at each point of contact of the arm: rubber on the fingers, and what gears and links give behind every
+contact (some 10 kNm/rad a joint). A rigid contact would stop a moving arm within one step, with a force that says more
+about the step's length than about the arm."""
+
 SEEN_EVERY = 10
 """Steps between two looks at the bodies: 100 Hz, a fast camera. Joints, fingers and wrist are sensed at each step."""
 
@@ -364,7 +369,14 @@ class BulletPlant:
 
         for link in self._link_names:
             p.changeDynamics(
-                self._robot, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, physicsClientId=self._client
+                self._robot,
+                link,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                contactStiffness=ARM_STIFFNESS,
+                contactDamping=ARM_DAMPING,
+                physicsClientId=self._client,
             )
         self.set_pad_friction(None)
         for finger in self._finger_joints:

@@ -41,7 +41,8 @@ SAMPLE_EVERY = 5
 """Control ticks between two samples of the signals and two looks at the true contacts: 100 Hz."""
 
 WORTH_A_LOOK = 15.0
-"""Newtons felt at the wrist from which the true contacts are looked at in every tick: a blow is over soon."""
+"""Newtons felt at the wrist from which the true contacts are looked at in every tick, as when the arm is struck
+elsewhere: a blow is over soon."""
 
 BRAKING = 2.0
 """Simulated seconds that the arm gets to come to rest after an interruption."""
@@ -232,7 +233,7 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
     force = controller.contact_force if controller.contact else 0.0
     tally.peak_felt_n = max(tally.peak_felt_n, force)
     is_due = n % SAMPLE_EVERY == 0
-    if is_due or controller.felt > WORTH_A_LOOK:
+    if is_due or controller.felt > WORTH_A_LOOK or controller.is_struck:
         contacts = machine.plant.contacts()
         audits.peaks.look(contacts, context)
     if is_due:

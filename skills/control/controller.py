@@ -11,6 +11,7 @@ from numba import njit
 from planner.motion.trajectory import Trajectory
 from sim.plant import Observation
 from sim.robot import RobotModel
+from skills.control.bracing import Brace
 from skills.control.bridge import Bridge
 from skills.control.contact import ContactWrench, Touch, along
 from skills.control.cushion import cushion
@@ -36,6 +37,9 @@ BORNE = 0.2
 
 UNBORNE_FOR = 0.04
 """Seconds without anything that bears it after which a pressed reference has lost contact."""
+
+UNBORNE_WHILE_LANDING = 0.1
+"""The same while the force is ramped up, and settles: a soft tool takes it up late."""
 
 PRESSED_SETTLING = 0.1
 """Seconds that the force is left to settle after it was ramped up."""
@@ -93,7 +97,9 @@ class ArmController:
         self.lap: Callable[[str], None] = nobody
         self._qp = TorqueQP(robot, period, lambda part: self.lap(part), solver)
         self._observer = MomentumObserver(period)
-        self._guard = Guard(safety or SafetyLimits(speed=robot.tcp_speed_max), robot.tau_max, period)
+        safety = safety or SafetyLimits(speed=robot.tcp_speed_max)
+        self._guard = Guard(safety, robot.tau_max, period)
+        self._brace = Brace(robot, safety.collision, period)
         self._compensation = Compensation(robot.tau_max, period)
         self._wrench = ContactWrench(robot, period)
         self._touch = Touch(period)
@@ -203,6 +209,11 @@ class ArmController:
         """Force in N on the hand from outside, in whatever direction, as felt just now."""
         x, y, z = self._wrench.raw[:3].tolist()
         return math.sqrt(x * x + y * y + z * z)
+
+    @property
+    def is_struck(self) -> bool:
+        """Does anything that isn't expected act on the arm, or has just acted?"""
+        return self._brace.is_struck
 
     @property
     def is_still(self) -> bool:
@@ -334,7 +345,8 @@ class ArmController:
         self._without_contact = self._unborne = 0.0
         self._anchor = float(reference.normal @ state.p)
         if not keep_loop:
-            self._loop.reset(max(along(reference.normal, self._wrench.raw), 0.0))
+            felt = along(reference.normal, self._wrench.raw)
+            self._loop.reset(min(max(felt, 0.0), reference.force))
         self._loop.aim(reference.force)
 
     def _watch_contact(self, state: ArmState) -> None:
@@ -350,15 +362,15 @@ class ArmController:
         self._without_contact = 0.0 if self._touch.closed else self._without_contact + self._period
         self._unborne = 0.0 if self._is_borne(reference) else self._unborne + self._period
         patience = LOST_AFTER_TOUCH if reference.until_contact else LOST_AFTER
-        if self._without_contact > patience or self._unborne > UNBORNE_FOR:
+        is_settled = self._loop.time_since_ramp >= PRESSED_SETTLING
+        unborne_for = UNBORNE_FOR if is_settled else UNBORNE_WHILE_LANDING
+        if self._without_contact > patience or self._unborne > unborne_for:
             self.contact_lost = True
             self._begin_hold(state)
 
     def _is_borne(self, reference: Reference) -> bool:
-        """Does something bear the force that is regulated, as far as that can be told yet?"""
-        if reference.mode != "hybrid" or self._loop.time_since_ramp < PRESSED_SETTLING:
-            return True
-        return along(reference.normal, self._wrench.raw) >= BORNE * reference.force
+        """Does something bear the force that is regulated?"""
+        return reference.mode != "hybrid" or along(reference.normal, self._wrench.raw) >= BORNE * self._loop.wanted
 
     def _law(self) -> Law:
         """What is asked for at this instant."""
@@ -382,11 +394,20 @@ class ArmController:
         _sum_up(self._bridge.advance(), self._compensation.advance(lacking), feedforward)
         if self._unexplained is not None:
             feedforward += cushion(state, self._robot)
+        feedforward += self._bracing(state)
         return feedforward
+
+    def _bracing(self, state: ArmState) -> np.ndarray:
+        """Torques (7,) against whoever pushes the arm; the hand only where nothing is to be touched."""
+        is_free = self._reference is None or self._reference.mode == "position"
+        wrench = self._wrench.credible if is_free and not self._wrench.is_silent else _NO_WRENCH
+        q, v, _ = self._course.now()
+        return self._brace.bear(state, wrench, self._observer.prompt - self._compensation.torque, (q, v))
 
 
 _UP = np.array([0.0, 0.0, 1.0])
 _NO_TORQUE = np.zeros(7)
+_NO_WRENCH = np.zeros(6)
 
 
 @njit(cache=True)

@@ -19,7 +19,7 @@ torque at once, and until the touch is noticed the arm goes on pressing with the
 LANDING = 0.12
 """Seconds after touching in which bouncing is damped."""
 
-APPROACH_LIMIT = 0.06
+APPROACH_LIMIT = 0.03
 """Metres per second towards the surface that the QP allows while contact is sought or kept."""
 
 Joints = tuple[np.ndarray, np.ndarray, np.ndarray]

@@ -127,3 +127,17 @@ def test_a_box_too_wide_for_the_stroke_has_no_grasp():
     gripper = RobotModel().gripper
     wide = Box((0.2, 0.2, 0.2))
     assert not list(grasps(wide, SE3.Identity(), gripper, np.zeros(3) - 1.0, np.random.default_rng(0)))
+
+
+def test_a_falling_hand_is_stopped_over_several_steps_and_not_within_one(world):
+    plant, robot, _ = world
+    heights = []
+    for _ in range(700):
+        plant.apply(Command(np.zeros(7), GripCommand(0.0, 0.0)))
+        plant.step()
+        touches = any({"finger_left", "finger_right"} & {c.first, c.second} for c in plant.contacts())
+        heights.append((robot.X_WG(plant.observe().q).translation[2], touches))
+    speeds, touching = -1000.0 * np.diff([h for h, _ in heights]), np.array([t for _, t in heights[1:]])
+    touched = int(np.argmax(touching))
+    assert speeds[touched - 1] > 0.3
+    assert speeds[touched + 1] > 0.5 * speeds[touched - 1]

@@ -166,10 +166,9 @@ class Lab:
             velocities.append(np.linalg.pinv(J) @ np.concatenate([way * rate / length, np.zeros(3)]))
         return Trajectory(times, np.array(positions), np.array(velocities))
 
-    def gripped_sponge(self, x: float, y: float, above_table: float) -> Rig:
+    def gripped_sponge(self, x: float, y: float, above_table: float, mass: float = 0.05) -> Rig:
         """A rig whose hand has closed on a sponge's ends, by friction, and holds it above the table, sensor tared."""
         turned = pin.rpy.rpyToMatrix(0.0, 0.0, np.pi / 2)
-        mass = 0.05
         sponge = Body(
             name="sponge",
             shape=Box((0.1, 0.06, 0.04)),

@@ -101,3 +101,31 @@ def test_a_sponge_that_slides_up_between_the_fingers_bears_no_more_and_the_arm_h
     assert rig.controller.contact_lost
     assert not any(struck)
     assert height - rig.position[2] < 0.005
+
+
+def test_a_sponge_that_falls_out_while_it_is_lowered_is_missed_before_the_hand_has_sunk_far(lab):
+    rig = lab.gripped_sponge(0.6, -0.2, 0.05, mass=0.15)
+    lower = lab.straight(rig.q, [0.0, 0.0, -0.06], 0.03)
+    rig.controller.follow(Reference(lower, "hybrid", force=FORCE, until_contact=True))
+    rig.run(0.3)
+    rig.plant.take_away("sponge")
+    height = rig.position[2]
+    struck = rig.run(2.0, lambda _: any("table" in pair for pair in rig.touching()))
+    assert rig.controller.contact_lost
+    assert not any(struck)
+    assert height - rig.position[2] < 0.015
+
+
+def test_a_hand_that_touches_harder_than_is_wanted_eases_at_once(lab):
+    rig = lab.rig(lab.ik(lab.down(0.6, 0.0, 0.02), lab.home), grip=GripCommand(-0.3, 20.0))
+    rig.run(0.5)
+    rig.controller.tare()
+    lower = lab.straight(rig.q, [0.0, 0.0, -0.03], 0.02)
+    rig.controller.follow(Reference(lower, "hybrid", force=5.0, until_contact=True))
+    pressed = rig.run(
+        3.0, lambda _: sum(c.normal_force for c in rig.plant.contacts() if "table" in (c.first, c.second))
+    )
+    hardest = int(np.argmax(pressed))
+    assert pressed[hardest] > 10.0
+    assert max(pressed[hardest + 25 :]) < 7.0
+    assert pressed[-1] == pytest.approx(5.0, abs=0.1)
