@@ -42,6 +42,7 @@ class LiftOff(Behaviour):
         if context.controller.contact:
             trajectory = straight_up(context.robot, context.observation.q, HEIGHT, DURATION)
             context.controller.follow(Reference(trajectory))
+            context.report("lifting_off")
         else:
             context.controller.hold()
 

@@ -47,7 +47,7 @@ class Ledger:
             case "action_done":
                 self._durations.append(t - self._started)
                 self._calm()
-            case "phase":
+            case "phase" | "lifting_off":
                 self._react(t)
         if kind in ANSWERS:
             self._answer(kind, t)

@@ -134,6 +134,9 @@ class _Teller:
     def _refined_again(self, event: Event, data: Any) -> None:
         self._say(f"{data['action']} was worked out anew: {data['reason']}.", f"{event.t:7.1f} s          ")
 
+    def _lifting_off(self, event: Event, data: Any) -> None:
+        self._say("The arm rose out of contact before it planned.", f"{event.t:7.1f} s          ")
+
     def _skipped(self, event: Event, data: Any) -> None:
         self._say(f"Skipped, as it was done already: {', '.join(data['actions'])}.", f"{event.t:7.1f} s          ")
 

@@ -26,6 +26,15 @@ def test_setting_out_anew_is_a_reaction_too():
     assert round(ledger.found[0].reacted_after_s, 6) == 0.1
 
 
+def test_rising_out_of_contact_is_a_reaction_too():
+    ledger = Ledger()
+    disturbed(ledger, 1.0, is_urgent=True)
+    ledger.hear("action_failed", 1.04, {})
+    ledger.hear("lifting_off", 1.08, {})
+    ledger.look(1.9, is_still=True)
+    assert round(ledger.found[0].reacted_after_s, 6) == 0.08
+
+
 def test_a_reaction_counts_from_when_the_sensors_could_show_it():
     for hidden, counted in ((0.0, 0.4), (0.3, 0.1), (0.5, 0.0), (None, 0.4)):
         ledger = Ledger()

@@ -85,6 +85,8 @@ def test_a_plan_dropped_in_the_middle_of_a_stroke_lifts_the_sponge_off_before_an
     bench = Bench(scene_with("sponge", "carrot"))
     assert bench.do("pick(sponge, dustpan)") is Status.SUCCESS
     context, lift = bench.context, LiftOff(bench.context)
+    told = []
+    context.report = lambda kind, **_: told.append(kind)
     act = bench.skills["wipe"].subtree(ActionRun(action("wipe(carrot, table, dustpan)")), context)
     while (phase := context.phase) is None or phase.name != "stroke" or context.controller.contact_force < 5.0:
         act.tick_once()
@@ -97,5 +99,6 @@ def test_a_plan_dropped_in_the_middle_of_a_stroke_lifts_the_sponge_off_before_an
         bench.run(TICKS_PER_TREE)
         lift.tick_once()
     assert lift.status is Status.SUCCESS
+    assert told[-1] == "lifting_off"
     assert bench.robot.X_WG(context.observation.q).translation[2] - height > 0.04
     assert not context.controller.contact
