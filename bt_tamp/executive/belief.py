@@ -9,14 +9,16 @@ from pinocchio import SE3
 
 from bt_tamp.executive.rest import at_rest
 from bt_tamp.executive.sighting import OVERLOOKED, REMEMBERED, Sighting
+from planner.task.facts import place_of
 from scenarios.scenario import Scenario
 from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, outline
 from sim.plant import Observation
 from sim.robot import RobotModel
-from sim.scene import Held, SceneState, pose_distance
+from sim.scene import Held, SceneState, is_on_floor, pose_distance
 
 GRIP_FORCE = 5.0
-"""Newtons below which the fingers hold nothing, but for what is seen to stay where it was between them."""
+"""Newtons below which the fingers hold nothing, but for what is seen to stay where it was between them, or to hang
+there."""
 
 STAYS = 0.008
 """Metres in the hand within which that is."""
@@ -27,6 +29,9 @@ KEEP_REACH = 0.025
 
 PAD_DEPTH = 0.01
 FINGERS_AT_REST = 0.01
+
+APART = 0.004
+"""Metres between the fingers from which something may be between them."""
 
 OFF_STOP = 1e-3
 """Rad by which a joint is believed off its stop, at least."""
@@ -138,7 +143,7 @@ class Belief:
 
     def _held_name(self, observation: Observation, X_WG: SE3, poses: Mapping[str, SE3], is_closing: bool) -> str | None:
         is_pressed = observation.grip_force >= GRIP_FORCE
-        if not is_closing or not (is_pressed or self._stays(observation)):
+        if not is_closing:
             return None
         if abs(observation.opening_velocity) > FINGERS_AT_REST and self._held is None:
             return None
@@ -147,12 +152,20 @@ class Belief:
         def gap(name: str) -> float:
             return distance_to(self._declared.bodies[name].shape, poses[name].actInv(pads))
 
-        if self._held is not None and self._held in poses and gap(self._held) < KEEP_REACH:
+        is_kept = is_pressed or self._stays(observation)
+        if is_kept and self._held is not None and self._held in poses and gap(self._held) < KEEP_REACH:
             return self._held
-        if not is_pressed:
-            return None
         nearest = min(poses, key=gap, default=None)
-        return nearest if nearest is not None and gap(nearest) < GRASP_REACH else None
+        if nearest is None or gap(nearest) >= GRASP_REACH:
+            return None
+        return nearest if is_pressed or self._hangs(nearest, observation, poses) else None
+
+    def _hangs(self, name: str, observation: Observation, poses: Mapping[str, SE3]) -> bool:
+        """Is a body between the fingers at rest with nothing under it? Then they hold it, however weakly."""
+        if observation.opening < APART or name not in observation.poses or not at_rest(observation.velocities[name]):
+            return False
+        scene = SceneState(self._scenario, poses, observation.q, observation.opening)
+        return place_of(scene, name) is None and not is_on_floor(scene, name)
 
 
 def distance_to(shape: Shape, p_O: np.ndarray) -> float:

@@ -15,6 +15,9 @@ Mode = Literal["position", "impedance", "hybrid"]
 SHORTEST_JOINING = 0.15
 """Seconds in which a difference between the arm and the trajectory's start fades, at least."""
 
+SHORTEST_STOP = 0.1
+"""Seconds in which the arm comes to rest, at least."""
+
 
 @dataclass(frozen=True, eq=False)
 class Reference:
@@ -133,7 +136,7 @@ class Course:
     def stop(q: np.ndarray, v: np.ndarray, a_max: np.ndarray) -> "Course":
         """Come to rest from q, v (7,), braking with at most a_max (7,) rad/s², and stay."""
         # With a gap of v T/2 the quintic's velocity falls monotonously, braking with 1.5 v/T at most.
-        duration = max(SHORTEST_JOINING, float((1.5 * np.abs(v) / a_max).max()))
+        duration = max(SHORTEST_STOP, float((1.5 * np.abs(v) / a_max).max()))
         rest = q + v * duration / 2
         return Course(Trajectory.standstill(rest), Fade(q - rest, v, duration))
 

@@ -134,18 +134,39 @@ def test_what_is_held_and_seen_late_is_where_the_hand_has_brought_it(scenario):
     assert pose_distance(scene.poses["sponge"], ROBOT.X_WG(path[-1]) * IN_HAND)[0] < 1e-6
 
 
+def ik_above(X_WO):
+    """A configuration (7,) that has the pads about a body."""
+    X_WG, q = SE3(np.diag([-1.0, 1.0, -1.0]), X_WO.translation + np.array([0.0, 0.0, -0.01])), np.full(7, 0.3)
+    data = ROBOT.data()
+    for _ in range(300):
+        J = pin.computeFrameJacobian(ROBOT.model, data, q, ROBOT.tcp_id, pin.ReferenceFrame.LOCAL)
+        error = pin.log6(ROBOT.X_WG(q).actInv(X_WG)).vector
+        q = q + np.clip(J.T @ np.linalg.solve(J @ J.T + 1e-4 * np.eye(6), error), -0.2, 0.2)
+    return q
+
+
 def test_what_fingers_without_force_hold_is_held_until_it_is_seen_to_leave_them(scenario):
     belief, q = Belief(scenario, ROBOT), scenario.robot.q0
     assert belief.update(held_at(scenario, q, IN_HAND, 0.0), True).held is not None
     lower = SE3(np.eye(3), IN_HAND.translation + np.array([0.0, 0.0, 0.012]))
 
-    def limp(X_GO, t):
-        return Observation(**(vars(held_at(scenario, q, X_GO, t)) | {"grip_force": 0.5}))
+    def limp(X_GO, t, sinking=0.0):
+        fingers_shut = held_at(scenario, q, X_GO, t)
+        velocities = dict(fingers_shut.velocities) | {"sponge": np.array([0.0, 0.0, -sinking, 0.0, 0.0, 0.0])}
+        return Observation(**(vars(fingers_shut) | {"grip_force": 0.5, "velocities": velocities}))
 
     assert belief.update(limp(IN_HAND, 0.1), True).held is not None
     assert belief.update(limp(IN_HAND, 0.5), True).held is not None
-    assert belief.update(limp(lower, 0.6), True).held is None
-    assert belief.update(limp(IN_HAND, 0.7), True).held is None
+    assert belief.update(limp(lower, 0.6, sinking=0.2), True).held is None
+    assert belief.update(limp(lower, 0.7, sinking=0.0), True).held is not None
+
+
+def test_what_lies_below_fingers_without_force_is_not_held(scenario):
+    belief = Belief(scenario, ROBOT)
+    on_table = seen(scenario, 0.0).poses["cube"]
+    q = ik_above(on_table)
+    assert belief.update(seen(scenario, 0.0, q=q, opening=0.05, grip_force=0.5), True).held is None
+    assert belief.update(seen(scenario, 0.1, q=q, opening=0.05, grip_force=20.0), True).held is not None
 
 
 def test_what_fingers_without_force_hold_out_of_sight_is_not_held(scenario):
