@@ -42,7 +42,7 @@ turning on the spot, that of a round patch 9 mm across (two thirds of its radius
 what is held would swing. PyBullet's wrist sensor leaves these torques out, some 0.1 Nm: forces are felt rightly, so a
 load's mass is, but not where its centre lies."""
 
-ARM_STIFFNESS, ARM_DAMPING = 2e4, 60.0
+ARM_STIFFNESS, ARM_DAMPING = 5e4, 150.0
 """N/m and N s/m at each point of contact of the arm: rubber on the fingers, and what gears and links give behind every
 contact (some 10 kNm/rad a joint). A rigid contact would stop a moving arm within one step, with a force that says more
 about the step's length than about the arm."""

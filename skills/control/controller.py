@@ -10,12 +10,13 @@ from numba import njit
 
 from planner.motion.trajectory import Trajectory
 from sim.plant import Observation
-from sim.robot import RobotModel
+from sim.robot import GRAVITY, RobotModel
 from skills.control.bracing import Brace
 from skills.control.bridge import Bridge
-from skills.control.contact import ContactWrench, Touch, along
+from skills.control.contact import ContactWrench, Touch, along, with_force_along
 from skills.control.cushion import cushion
 from skills.control.dynamics import Dynamics
+from skills.control.fingers import FingerWork
 from skills.control.force import ForceLoop
 from skills.control.laws import Law, comply, lowered, press, seek, track
 from skills.control.momentum import Compensation, MomentumObserver
@@ -30,10 +31,13 @@ LOST_AFTER = 0.014
 """Seconds without contact, on top of its debouncing, after which a pressed reference has lost it."""
 
 LOST_AFTER_TOUCH = 0.25
-"""The same while touching down, when the tool may bounce."""
+"""The same while touching down, when the tool may bounce. A regulated force is missed after UNBORNE_WHILE_LANDING."""
 
 BORNE = 0.2
 """Share of a regulated force from which something bears it: what slides up between the fingers still rubs a little."""
+
+LOST_LOAD, MOSTLY = 1.2, 0.8
+"""Times the weight of what is held that must be felt, unless it is as much as this share of the force."""
 
 UNBORNE_FOR = 0.04
 """Seconds without anything that bears it after which a pressed reference has lost contact."""
@@ -115,6 +119,8 @@ class ArmController:
         self._pressed = self._presses = False
         self._anchor = 0.0
         self._without_contact = self._unborne = 0.0
+        self._finger_work = FingerWork(period)
+        self._weight = 0.0
         self._slowed = 1.0
         self._unexplained: np.ndarray | None = None
         self.contact_lost = False
@@ -144,11 +150,13 @@ class ArmController:
     def set_payload(self, mass: float, com_G: np.ndarray, inertia_G: np.ndarray) -> None:
         """A rigid load is in the hand: mass in kg, centre com_G (3,) in m, inertia (3,3) in kg m² about it, in G."""
         load = pin.Inertia(mass, np.asarray(com_G, dtype=float), np.asarray(inertia_G, dtype=float))
+        self._weight = mass * GRAVITY
         self._use(self._unloaded.with_payload(mass, load.lever, load.inertia), load)
 
     def clear_payload(self) -> None:
         """The hand is empty again. Calling it again changes nothing."""
         if self._robot is not self._unloaded:
+            self._weight = 0.0
             self._use(self._unloaded, None)
 
     def _use(self, robot: RobotModel, load: pin.Inertia | None) -> None:
@@ -268,13 +276,14 @@ class ArmController:
         self._state = state
         self.lap("model")
         self._wrench.update(state, observation.wrist)
-        felt = state.torques_of(self._wrench.credible)
+        felt = state.torques_of(_NO_WRENCH if self._wrench.is_silent else self._wrench.credible)
         self._observer.update(state.M, state.bias, state.v, observation.tau, felt)
         if self._pending is not None:
             self._begin(self._pending, state)
         elif self._hold_pending:
             self._begin_hold(state)
         self._watch_contact(state)
+        self._finger_work.update(observation.opening_velocity, along(state.R[:, 1], self._wrench.raw))
         self._watch_safety(state)
         if self._law_changed:
             self._bridge.drop()
@@ -369,8 +378,12 @@ class ArmController:
             self._begin_hold(state)
 
     def _is_borne(self, reference: Reference) -> bool:
-        """Does something bear the force that is regulated?"""
-        return reference.mode != "hybrid" or along(reference.normal, self._wrench.raw) >= BORNE * self._loop.wanted
+        """Does something bear the force that is regulated? A load that is lost seems to bear its weight."""
+        if reference.mode != "hybrid":
+            return True
+        lost = abs(self._weight * float(reference.normal[2]))
+        least = max(BORNE * self._loop.wanted, min(LOST_LOAD * lost, MOSTLY * self._loop.wanted))
+        return along(reference.normal, self._wrench.raw) >= least
 
     def _law(self) -> Law:
         """What is asked for at this instant."""
@@ -398,11 +411,24 @@ class ArmController:
         return feedforward
 
     def _bracing(self, state: ArmState) -> np.ndarray:
-        """Torques (7,) against whoever pushes the arm; the hand only where nothing is to be touched."""
-        is_free = self._reference is None or self._reference.mode == "position"
-        wrench = self._wrench.credible if is_free and not self._wrench.is_silent else _NO_WRENCH
+        """Torques (7,) against whoever pushes the arm."""
         q, v, _ = self._course.now()
-        return self._brace.bear(state, wrench, self._observer.prompt - self._compensation.torque, (q, v))
+        return self._brace.bear(state, self._push(state), self._observer.prompt - self._compensation.torque, (q, v))
+
+    def _push(self, state: ArmState) -> np.ndarray:
+        """The wrench (6,) on the hand that is neither wanted nor borne by the law, nor the fingers' own doing."""
+        reference, felt = self._reference, self._wrench
+        if felt.is_silent:
+            return _NO_WRENCH
+        if reference is not None and reference.mode != "position":
+            if reference.mode == "impedance":
+                return _NO_WRENCH
+            unborne = felt.credible - felt.smooth if self._pressed else felt.credible
+            return with_force_along(reference.normal, 0.0, unborne)
+        if self._presses and not self._brace.is_struck:
+            # What was pressed on gives back what the pressing put into it.
+            return _NO_WRENCH
+        return with_force_along(state.R[:, 1], 0.0, felt.credible) if self._finger_work.goes_on else felt.credible
 
 
 _UP = np.array([0.0, 0.0, 1.0])

@@ -103,8 +103,9 @@ def test_a_sponge_that_slides_up_between_the_fingers_bears_no_more_and_the_arm_h
     assert height - rig.position[2] < 0.005
 
 
-def test_a_sponge_that_falls_out_while_it_is_lowered_is_missed_before_the_hand_has_sunk_far(lab):
-    rig = lab.gripped_sponge(0.6, -0.2, 0.05, mass=0.15)
+@pytest.mark.parametrize("mass", [0.15, 0.3])
+def test_a_sponge_that_falls_out_while_it_is_lowered_is_missed_before_the_hand_has_sunk_far(lab, mass):
+    rig = lab.gripped_sponge(0.6, -0.2, 0.05, mass)
     lower = lab.straight(rig.q, [0.0, 0.0, -0.06], 0.03)
     rig.controller.follow(Reference(lower, "hybrid", force=FORCE, until_contact=True))
     rig.run(0.3)
