@@ -1,4 +1,4 @@
-"""Whether what is felt along the fingers' way is their own doing: one that meets something fixed pushes the hand off."""
+"""Is what is felt along the fingers' way their own doing? One that meets something fixed pushes the hand off."""
 
 MOVING = 0.005
 """Metres per second of opening from which the fingers move."""
