@@ -6,7 +6,7 @@ the task planner finds nothing more, budgets are widened and sampled facts retra
 number of times; infeasible is only called what follows from proofs.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import Any, Literal
@@ -140,16 +140,33 @@ class SearchThenSample:
         return outcome
 
     def refine(
-        self, action: GroundAction, scene: SceneState, rng: np.random.Generator, work: Work
+        self,
+        action: GroundAction,
+        scene: SceneState,
+        rng: np.random.Generator,
+        work: Work,
+        rest: Sequence[GroundAction] = (),
     ) -> Refinement | RefinementFailure:
         """One action of the plan in force refined again in the scene as observed, the plan's samples first.
 
-        A failure is not learned from until it is handed to `learn`.
+        Another sample than the plan's has to leave its object so that what `rest`, the actions that follow, does next
+        with it can be done; where none of a few does, the first is taken. A failure is not learned from until it is
+        handed to `learn`.
         """
         self._stated = None
         self.learned.observe(scene)
         situation, first = Situation.now(scene), self._samples.get(action, ())
-        return self._actions.refine(action, situation, rng, self._budget, work, first=first)[0]
+        follower = next((later for later in rest if later.args[0] == action.args[0]), None)
+        chosen: list[Refinement] = []
+        for _ in range(self._settings.backtracks + 1):
+            avoid = {earlier.sample for earlier in chosen}
+            outcome = self._actions.refine(action, situation, rng, self._budget, work, first=first, avoid=avoid)[0]
+            if isinstance(outcome, RefinementFailure):
+                return chosen[0] if chosen else outcome
+            if outcome.sample in first or follower is None or self._is_open(follower, situation, outcome, rng, work):
+                return outcome
+            chosen.append(outcome)
+        return chosen[0]
 
     def learn(self, failure: RefinementFailure | ExecutionFailure, scene: SceneState) -> None:
         """Take in a failure met while acting; `scene` is as observed."""
@@ -169,6 +186,17 @@ class SearchThenSample:
         """Take in that an action was carried out as refined and came to its effect."""
         self._stated = None
         self.learned.learn_success(refinement.action, refinement.sample)
+
+    def _is_open(
+        self, follower: GroundAction, situation: Situation, earlier: Refinement, rng: np.random.Generator, work: Work
+    ) -> bool:
+        """Can an action be done where an earlier one is predicted to leave its object, at least with others away?"""
+        scene = self._actions.predict(situation.scene, earlier)
+        if isinstance(scene, RefinementFailure):
+            return False
+        after = situation.after(earlier.action, scene, situation.facts)
+        outcome = self._actions.refine(follower, after, rng, self._budget, work)[0]
+        return isinstance(outcome, Refinement) or any(outcome.culprit_sets)
 
     def _rounds(
         self, scene: SceneState, goal: frozenset[Fact], rng: np.random.Generator, work: Work

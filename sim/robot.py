@@ -113,6 +113,12 @@ class RobotModel:
         pin.forwardKinematics(self.model, self._data, q)
         return SE3(pin.updateFramePlacement(self.model, self._data, self.tcp_id))
 
+    def V_WG(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Velocity (6,) of the gripper frame's origin in W, linear before angular, at q (7,) and v (7,) in rad/s."""
+        pin.forwardKinematics(self.model, self._data, q, v)
+        frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        return pin.getFrameVelocity(self.model, self._data, self.tcp_id, frame).vector.copy()
+
     def link_poses(self, q: np.ndarray, opening: float) -> dict[str, SE3]:
         """Poses X_WL of all links at q (7,), the fingers `opening` metres apart."""
         pin.framesForwardKinematics(self.model, self._data, q)

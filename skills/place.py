@@ -4,6 +4,8 @@ from dataclasses import replace
 from itertools import zip_longest
 
 import numpy as np
+import pinocchio as pin
+from pinocchio import SE3
 from py_trees.behaviour import Behaviour
 
 from planner.failure import MotionFailure, RefinementFailure
@@ -13,6 +15,7 @@ from planner.placements import Placement, Surface, placements, surface_of, top_o
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
 from planner.support import borne
 from planner.task.facts import place_of
+from planner.task.situation import DISPLACED, TURNED
 from planner.task.symbols import GroundAction
 from scenarios.scenario import Region, Scenario, Table
 from scenarios.shapes import Shape, inscribed_radius
@@ -73,6 +76,10 @@ CARRIED_TURN = np.radians(30.0)
 hand is swung round, and it may be swung right round."""
 
 
+_STEPS = DISPLACED * np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+_TURNS = tuple(pin.rpy.rpyToMatrix(0.0, 0.0, yaw) for yaw in (-TURNED, TURNED))
+
+
 class Place:
     """`place(object, place)`: a release pose found by sampling; straight down to it, open, straight back. What stands
     on the object comes along."""
@@ -115,6 +122,8 @@ class Place:
         drawn = (sample for turn in zip_longest(*ways) for sample in turn if sample is not None)
 
         def has_room(placement: Placement) -> bool:
+            if body.tool and not self._leaves_in_reach(name, placement, bare):
+                return False
             return isinstance(self._release(name, placement, bare), float)
 
         samples = clear_first(drawn, body, standing_about(bare), has_room)
@@ -158,6 +167,16 @@ class Place:
 
         wide, tight = open_width(gripper, scene.opening), min(gripper.stroke, scene.opening + TIGHT)
         return wide if opened(wide) is None else opened(tight) or tight
+
+    def _leaves_in_reach(self, name: str, placement: Placement, scene: SceneState) -> bool:
+        """Has the hand room to take the object up again as it is held, wherever close to the placement it lies then?"""
+        gripper, held = self._kit.robot.gripper, scene.held
+        assert held is not None
+        X_WO = placement.X_WO_rest
+        ready = replace(scene.moved(name, X_WO), held=None, opening=open_width(gripper, scene.opening))
+        touching = pairs(self._kit.robot.hand_links, name)
+        astray = (SE3(turn @ X_WO.rotation, X_WO.translation + step) for turn in _TURNS for step in _STEPS)
+        return not any(hand_would_hit(self._kit, ready, X * held.X_GO.inverse(), touching) for X in astray)
 
     def _attempt(
         self, action: GroundAction, placement: Placement, scene: SceneState

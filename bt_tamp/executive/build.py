@@ -73,7 +73,7 @@ def build(
         grip=GripDriver(robot.gripper),
         observation=observation,
         scene=belief.update(observation, is_closing=False),
-        refine=lambda action: planner.refine(action, context.scene),
+        refine=lambda action: planner.refine(action, context.scene, agenda.left[1:]),
         contact_mode=contact.mode,
         is_watchful=options.replan,
         report=report,

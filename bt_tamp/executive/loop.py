@@ -31,7 +31,7 @@ from bt_tamp.stopping import uninterrupted
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
 from sim.disturbance import DisturbedPlant
-from sim.plant import Command
+from sim.plant import Command, Observation
 from sim.scene import SceneState, is_on_floor
 
 STANDS = ("plan_installed", "action_started", "action_done", "action_failed")
@@ -235,7 +235,8 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
     is_due = n % SAMPLE_EVERY == 0
     if is_due or controller.felt > WORTH_A_LOOK or controller.is_struck:
         contacts = machine.plant.contacts()
-        audits.peaks.look(contacts, context)
+        held = context.scene.held
+        audits.peaks.look(contacts, _truth(machine), held.name if held is not None else None)
     if is_due:
         rates = zip(observation.tau.tolist(), observation.v.tolist(), strict=True)
         power = sum(abs(torque * rate) for torque, rate in rates)
@@ -245,8 +246,7 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
         q_ref = reference.course.at(controller.time_in_reference)[0] if reference else observation.q
         p_ref = machine.robot.X_WG(q_ref).translation if wanted else None
         # What is recorded is what was, not what was sensed.
-        truth = machine.plant.truth() if isinstance(machine.plant, DisturbedPlant) else observation
-        recorder.sample(truth, Reference(q_ref, p_ref, wanted), force)
+        recorder.sample(_truth(machine), Reference(q_ref, p_ref, wanted), force)
         running = str(machine.agenda.running or "planning")
         audits.contacts.look(observation.t, contacts, context, running)
         audits.forces.look(observation.t, contacts, context, running)
@@ -255,6 +255,10 @@ def _account(machine: Machine, recorder: RunRecorder, audits: Audits, tally: Tal
                 observation.t,
                 [Contact(c.first, c.second, c.position, c.force) for c in audits.contacts.of_robot(contacts, context)],
             )
+
+
+def _truth(machine: Machine) -> Observation:
+    return machine.plant.truth() if isinstance(machine.plant, DisturbedPlant) else machine.context.observation
 
 
 def _ending(machine: Machine, options: RunOptions, tally: Tally) -> Ending | None:

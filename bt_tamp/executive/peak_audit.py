@@ -3,9 +3,15 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from sim.contact import Contact
+from sim.plant import Observation
 from sim.robot import RobotModel
-from skills.context import SkillContext
+
+SLIPPING = 0.2
+"""m/s by which a body moves otherwise than the hand, from which on the hand holds it no longer: it falls, and with what
+force it lands isn't the arm's doing."""
 
 
 class PeakAudit:
@@ -13,13 +19,13 @@ class PeakAudit:
     both fingers squeeze pushes back as much on one as on the other."""
 
     def __init__(self, robot: RobotModel) -> None:
+        self._robot = robot
         self._links = frozenset(robot.links)
         self.peak = 0.0
 
-    def look(self, contacts: Sequence[Contact], context: SkillContext) -> None:
-        """Take in the contacts of this instant."""
-        held = context.scene.held
-        mine = self._links if held is None else self._links | {held.name}
+    def look(self, contacts: Sequence[Contact], truth: Observation, held: str | None) -> None:
+        """Take in the contacts of this instant. held: what the hand is believed to hold."""
+        mine = self._links if held is None or self._slips(held, truth) else self._links | {held}
         forces: dict[str, list[float]] = {}
         for contact in contacts:
             if (contact.first in mine) == (contact.second in mine) or {contact.first, contact.second} == _BASE:
@@ -30,6 +36,14 @@ class PeakAudit:
                 net[axis] += sign * part
         for net in forces.values():
             self.peak = max(self.peak, math.hypot(*net))
+
+    def _slips(self, name: str, truth: Observation) -> bool:
+        if name not in truth.poses:
+            return True
+        V_WG = self._robot.V_WG(truth.q, truth.v)
+        lever = truth.poses[name].translation - self._robot.X_WG(truth.q).translation
+        relative = truth.velocities[name][:3] - V_WG[:3] - np.cross(V_WG[3:], lever)
+        return math.hypot(*relative.tolist()) > SLIPPING
 
 
 _BASE = {"pedestal", "link_0"}

@@ -1,6 +1,7 @@
 """The planner node: feeds back what failed, plans from what is observed now, and rebuilds `act`."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,11 +70,14 @@ class Planner:
         thinking.plans += 1
         return outcome
 
-    def refine(self, action: GroundAction, scene: SceneState) -> tuple[Refinement | RefinementFailure, float]:
-        """One action refined again in the scene as it is believed now, and the simulated seconds it costs."""
+    def refine(
+        self, action: GroundAction, scene: SceneState, rest: Sequence[GroundAction]
+    ) -> tuple[Refinement | RefinementFailure, float]:
+        """One action refined again in the scene as it is believed now, `rest` to follow, and the simulated seconds it
+        costs."""
         with self.thinking as thinking:
             before = thinking.simulated_cost()
-            outcome = self.search.refine(action, scene, self._rng, thinking.work)
+            outcome = self.search.refine(action, scene, self._rng, thinking.work, rest)
             return outcome, thinking.simulated_cost() - before
 
 

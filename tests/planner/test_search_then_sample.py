@@ -544,6 +544,44 @@ def test_an_action_is_refined_again_with_the_samples_of_the_plan_first(tabletop,
     assert skill.calls[0][1] == [3]
 
 
+PLACE_CUP = GroundAction("place", ("cup", "right_bin"))
+PICK_CUP_AGAIN = GroundAction("pick", ("cup", "right_bin"))
+
+
+def in_hand(scene, name):
+    """The body taken up."""
+    return replace(scene, held=Held(name, SE3.Identity()))
+
+
+@pytest.mark.parametrize(
+    ("obstacles", "chosen"),
+    [(set(), 3), ({"mug"}, 2)],
+    ids=["what nothing helps is avoided", "what is only in the way may go in between"],
+)
+def test_an_action_refined_otherwise_than_planned_leaves_its_object_so_that_the_plan_can_go_on(
+    tabletop, stand_in, obstacles, chosen
+):
+    def pick_cup(sample, scene):
+        # The stand-in lays things side by side: from the fourth spot on the cup can be taken up again.
+        return None if scene.poses["cup"].translation[0] > 0.0 else obstacles
+
+    skill = stand_in(rule(place_cup=lambda sample, scene: None if sample >= 2 else set(), pick_cup=pick_cup))
+    run = Run(skill)
+    outcome = run.loop.refine(
+        PLACE_CUP, in_hand(tabletop("cup mug"), "cup"), np.random.default_rng(0), Work(), rest=(PICK_CUP_AGAIN,)
+    )
+    assert outcome.sample == chosen
+
+
+def test_where_nothing_lets_the_plan_go_on_the_first_that_can_be_done_is_taken(tabletop, stand_in):
+    skill = stand_in(rule(place_cup=lambda sample, scene: None if sample >= 2 else set(), pick_cup=never))
+    run = Run(skill)
+    outcome = run.loop.refine(
+        PLACE_CUP, in_hand(tabletop("cup mug"), "cup"), np.random.default_rng(0), Work(), rest=(PICK_CUP_AGAIN,)
+    )
+    assert outcome.sample == 2
+
+
 def test_when_planned_again_what_worked_is_tried_first(tabletop, stand_in):
     skill = stand_in(rule(pick_cup=lambda sample, scene: None if sample >= 3 else set()))
     run = Run(skill)

@@ -51,6 +51,17 @@ def test_pybullet_and_pinocchio_agree_in_mass_matrix_gravity_and_bias(bullet_rob
     np.testing.assert_allclose(bias, pin.rnea(full_model, data, q, v, zero), atol=1e-9)
 
 
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000))
+def test_the_hands_velocity_is_the_rate_of_its_pose(seed):
+    robot, rng, dt = RobotModel(), np.random.default_rng(seed), 1e-6
+    q = rng.uniform(robot.q_min, robot.q_max)
+    v = rng.uniform(-1.0, 1.0, 7)
+    before, after, V_WG = robot.X_WG(q - v * dt), robot.X_WG(q + v * dt), robot.V_WG(q, v)
+    np.testing.assert_allclose(V_WG[:3], (after.translation - before.translation) / (2 * dt), atol=1e-5)
+    np.testing.assert_allclose(V_WG[3:], pin.log3(after.rotation @ before.rotation.T) / (2 * dt), atol=1e-5)
+
+
 def test_the_arms_limits_are_the_makers():
     robot = RobotModel()
     np.testing.assert_allclose(robot.tau_max, [320, 320, 176, 176, 110, 40, 40])

@@ -180,3 +180,22 @@ def test_fingers_that_let_go_beside_a_wall_open_no_further_than_there_is_room():
     let_go = replace(scene.moved("box", beside.X_WO), held=None, opening=opened.opening)
     touching = pairs(bench.robot.hand_links, "box") | pairs("box", "right_bin")
     assert bench.motion.free(let_go, opened.trajectory.end, touching, 0.0)
+
+
+def test_a_tool_is_laid_down_where_it_can_be_taken_up_again_if_it_comes_to_lie_a_little_otherwise():
+    for seed in range(8):
+        bench = Bench(scene_with("sponge", seed=seed), seed=seed)
+        taken = bench.refine(action("pick(sponge, dustpan)"))
+        assert isinstance(taken, Refinement), taken
+        bench.context.scene = bench.skills["pick"].predict(bench.scene, taken)
+        laid = bench.refine(action("place(sponge, left_bin)"))
+        assert isinstance(laid, Refinement), laid
+        there = bench.skills["place"].predict(bench.scene, laid)
+        X_WO = there.poses["sponge"]
+        for yaw in np.radians([-5.0, 5.0]):
+            for step in (0.006 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])).tolist():
+                bench.context.scene = there.moved(
+                    "sponge", SE3(pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ X_WO.rotation, X_WO.translation + step)
+                )
+                again = bench.refine(action("pick(sponge, left_bin)"))
+                assert isinstance(again, Refinement), (seed, yaw, step, again.reason)
