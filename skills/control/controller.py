@@ -13,40 +13,19 @@ from sim.plant import Observation
 from sim.robot import GRAVITY, RobotModel
 from skills.control.bracing import Brace
 from skills.control.bridge import Bridge
-from skills.control.contact import ContactWrench, Touch, along, with_force_along
+from skills.control.contact import ContactWrench, along, with_force_along
 from skills.control.cushion import cushion
 from skills.control.dynamics import Dynamics
 from skills.control.fingers import FingerWork
-from skills.control.force import ForceLoop
 from skills.control.laws import Law, comply, lowered, press, seek, track
 from skills.control.momentum import Compensation, MomentumObserver
 from skills.control.osqp_ import Solver
+from skills.control.pressed import PressedContact
 from skills.control.reference import Course, Reference, near_contact
 from skills.control.safety import Collision, ForceTooHigh, Guard, SafetyLimits, Stop
 from skills.control.state import ArmState
 from skills.control.tasks import pose_error
 from skills.control.torque_qp import TorqueQP, nobody
-
-LOST_AFTER = 0.014
-"""Seconds without contact, on top of its debouncing, after which a pressed reference has lost it."""
-
-LOST_AFTER_TOUCH = 0.25
-"""The same while touching down, when the tool may bounce. A regulated force is missed after UNBORNE_WHILE_LANDING."""
-
-BORNE = 0.2
-"""Share of a regulated force from which something bears it: what slides up between the fingers still rubs a little."""
-
-LOST_LOAD, MOSTLY = 1.2, 0.8
-"""Times the weight of what is held that must be felt, unless it is as much as this share of the force."""
-
-UNBORNE_FOR = 0.04
-"""Seconds without anything that bears it after which a pressed reference has lost contact."""
-
-UNBORNE_WHILE_LANDING = 0.1
-"""The same while the force is ramped up, and settles: a soft tool takes it up late."""
-
-PRESSED_SETTLING = 0.1
-"""Seconds that the force is left to settle after it was ramped up."""
 
 AT_REST = 0.02
 """Joint speed in rad/s below which the arm counts as at rest."""
@@ -106,8 +85,7 @@ class ArmController:
         self._brace = Brace(robot, safety.collision, period)
         self._compensation = Compensation(robot.tau_max, period)
         self._wrench = ContactWrench(robot, period)
-        self._touch = Touch(period)
-        self._loop = ForceLoop(period)
+        self._contact = PressedContact(period)
         self._bridge = Bridge(period)
         self._reference: Reference | None = None
         self._pending: Reference | None = None
@@ -116,9 +94,7 @@ class ArmController:
         self._course = Course(Trajectory.standstill(np.zeros(7)))
         self._state: ArmState | None = None
         self._tau: np.ndarray | None = None
-        self._pressed = self._presses = False
-        self._anchor = 0.0
-        self._without_contact = self._unborne = 0.0
+        self._lingers = False
         self._finger_work = FingerWork(period)
         self._weight = 0.0
         self._slowed = 1.0
@@ -168,7 +144,7 @@ class ArmController:
     def tare(self) -> None:
         """Take what the wrist sensor feels for its error. In the air, nearly still, before each touch."""
         self._wrench.tare()
-        self._touch = Touch(self._period)
+        self._contact.tare()
 
     @property
     def reference(self) -> Reference | None:
@@ -187,8 +163,8 @@ class ArmController:
         state = self._state
         if state is None or self._pending is not None or self._hold_pending or self.stopped is not None:
             return False
-        if self._reference is not None and self._reference.until_contact and self._pressed:
-            return self._loop.time_since_ramp >= PRESSED_SETTLING
+        if self._reference is not None and self._reference.until_contact and self._contact.is_pressed:
+            return self._contact.has_settled
         if not self._course.over or np.abs(state.v).max() > AT_REST:
             return False
         in_position = self._reference is None or self._reference.mode == "position"
@@ -205,7 +181,7 @@ class ArmController:
     @property
     def contact(self) -> bool:
         """Whether the tool is pressed on from outside along the contact frame's z axis."""
-        return self._touch.closed
+        return self._contact.is_closed
 
     @property
     def contact_force(self) -> float:
@@ -234,7 +210,7 @@ class ArmController:
             return TrackingError(0.0, 0.0, 0.0, 0.0)
         q, v, a = self._course.now()
         error = pose_error(self._dynamics.target(q, v, a), self._state)
-        if self._pressed:
+        if self._contact.is_pressed:
             error[:3] -= self._normal * (self._normal @ error[:3])
         joints = np.abs(q - self._state.q)
         hand = joints * (np.linalg.norm(self._state.J[:3], axis=0) + HAND_RADIUS)
@@ -309,7 +285,7 @@ class ArmController:
             self._reference, self._pending = reference, None
             self._course = self._course.passed(reference.course, before.trajectory.duration)
             return
-        was_regulated = self._pressed and self._reference is not None and self._reference.mode == "hybrid"
+        was_regulated = self._contact.is_pressed and before is not None and before.mode == "hybrid"
         self._reference, self._pending = reference, None
         self._slowed, trajectory = 1.0, reference.course
         if reference.until_contact:
@@ -317,16 +293,15 @@ class ArmController:
             trajectory = trajectory.slowed(self._slowed)
         self._course = Course.joined(trajectory, state.q, state.v, self._robot.a_max)
         self._law_changed = True
-        self._without_contact = 0.0
-        self._pressed = False
+        self._contact.end()
         if reference.force > 0.0 and not reference.until_contact:
-            self._press(reference, state, keep_loop=was_regulated and reference.mode == "hybrid")
+            self._press(reference, state, keeps_force=was_regulated and reference.mode == "hybrid")
 
     def _begin_hold(self, state: ArmState) -> None:
         self._reference, self._hold_pending = None, False
         self._course = Course.stop(state.q, state.v, STOPPING * self._robot.a_max)
         self._law_changed = True
-        self._pressed = False
+        self._contact.end()
 
     def _stop(self, reason: Stop, state: ArmState) -> None:
         self.stopped = reason
@@ -341,63 +316,40 @@ class ArmController:
             return
         guard, reference = self._guard, self._reference
         tau = _NO_TORQUE if self._tau is None else self._tau
-        # What is pressed on is still there for a moment when it need no longer be pressed.
-        self._presses = self._pressed or (self._presses and self.contact)
-        reason = guard.look(state.V, self._wrench.raw, self._observer.sudden, tau, self._presses)
+        self._lingers = self._contact.linger()
+        reason = guard.look(state.V, self._wrench.raw, self._observer.sudden, tau, self._lingers)
         if reason is None and reference is not None and reference.force > 0.0:
             reason = guard.sensor(self._wrench.is_silent)
         if reason is not None:
             self._stop(reason, state)
 
-    def _press(self, reference: Reference, state: ArmState, keep_loop: bool) -> None:
-        self._pressed = True
-        self._without_contact = self._unborne = 0.0
-        self._anchor = float(reference.normal @ state.p)
-        if not keep_loop:
-            felt = along(reference.normal, self._wrench.raw)
-            self._loop.reset(min(max(felt, 0.0), reference.force))
-        self._loop.aim(reference.force)
+    def _press(self, reference: Reference, state: ArmState, keeps_force: bool = False) -> None:
+        felt = along(reference.normal, self._wrench.raw)
+        self._contact.begin(reference, felt, float(reference.normal @ state.p), keeps_force)
 
     def _watch_contact(self, state: ArmState) -> None:
-        self._touch.update(along(self._normal, self._wrench.raw))
         reference = self._reference
-        if reference is None or reference.force == 0.0:
-            return
-        if not self._pressed:
-            if self._touch.closed:
-                self._course.freeze()
-                self._press(reference, state, keep_loop=False)
-            return
-        self._without_contact = 0.0 if self._touch.closed else self._without_contact + self._period
-        self._unborne = 0.0 if self._is_borne(reference) else self._unborne + self._period
-        patience = LOST_AFTER_TOUCH if reference.until_contact else LOST_AFTER
-        is_settled = self._loop.time_since_ramp >= PRESSED_SETTLING
-        unborne_for = UNBORNE_FOR if is_settled else UNBORNE_WHILE_LANDING
-        if self._without_contact > patience or self._unborne > unborne_for:
+        change = self._contact.look(reference, along(self._normal, self._wrench.raw), self._weight)
+        if change == "touched" and reference is not None:
+            self._course.freeze()
+            self._press(reference, state)
+        elif change == "lost":
             self.contact_lost = True
             self._begin_hold(state)
 
-    def _is_borne(self, reference: Reference) -> bool:
-        """Does something bear the force that is regulated? A load that is lost seems to bear its weight."""
-        if reference.mode != "hybrid":
-            return True
-        lost = abs(self._weight * float(reference.normal[2]))
-        least = max(BORNE * self._loop.wanted, min(LOST_LOAD * lost, MOSTLY * self._loop.wanted))
-        return along(reference.normal, self._wrench.raw) >= least
-
     def _law(self) -> Law:
         """What is asked for at this instant."""
-        reference, joints = self._reference, self._course.now()
+        reference, joints, contact = self._reference, self._course.now(), self._contact
         if reference is None or reference.mode == "position":
             return track(joints)
-        if reference.mode == "hybrid" and not self._pressed:
+        if reference.mode == "hybrid" and not contact.is_pressed:
             return seek(joints, reference)
         target = self._dynamics.target(*joints)
         if reference.mode == "hybrid":
-            return press(joints, target, reference, self._wrench, self._loop)
-        if self._pressed:
-            self._loop.update(self._loop.wanted)
-            target = lowered(target, reference, self._loop.wanted, self._anchor)
+            return press(joints, target, reference, self._wrench, contact.loop)
+        if contact.is_pressed:
+            contact.loop.update(contact.loop.wanted)
+            target = lowered(target, reference, contact.loop.wanted, contact.anchor)
         return comply(joints, target, reference, self._period)
 
     def _feedforward(self, state: ArmState, wrench: np.ndarray) -> np.ndarray:
@@ -423,9 +375,9 @@ class ArmController:
         if reference is not None and reference.mode != "position":
             if reference.mode == "impedance":
                 return _NO_WRENCH
-            unborne = felt.credible - felt.smooth if self._pressed else felt.credible
+            unborne = felt.credible - felt.smooth if self._contact.is_pressed else felt.credible
             return with_force_along(reference.normal, 0.0, unborne)
-        if self._presses and not self._brace.is_struck:
+        if self._lingers and not self._brace.is_struck:
             # What was pressed on gives back what the pressing put into it.
             return _NO_WRENCH
         return with_force_along(state.R[:, 1], 0.0, felt.credible) if self._finger_work.goes_on else felt.credible
