@@ -1,6 +1,6 @@
 """What skills ask about motion: inverse kinematics, straight lines, collision-free moves, and their timing."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache
@@ -36,6 +36,10 @@ SLACK = 0.0005
 
 DEEPEST = -0.004
 """Distance in metres (negative: overlap) at which the arm may still start: things held or pressed give way a little."""
+
+WEDGED = -0.015
+"""The same where the hand is first drawn straight out: fingers that something holds up stand otherwise than their
+opening tells."""
 
 TOUCHING = 0.002
 """Metres within which what is held touches what it stands on, or leans on."""
@@ -215,7 +219,7 @@ class MotionPlanner:
         """
         seed, ends = self._next_seed(), self.ends(scene, q_goals, allowed)
         if isinstance(ends, MotionFailure):
-            return ends
+            return self._drawn_out(scene, q_goals, allowed, seed, max_checks) or ends
         fixed = scene.without(movables(scene))
         walled_in = cache(lambda: self._enclosed(fixed, ends, seed))
         enclosed = cache(lambda: walled_in() or (self._enclosed(scene, ends, seed) if movables(scene) else None))
@@ -227,7 +231,7 @@ class MotionPlanner:
         for attempt in range(_ATTEMPTS):
             path = self._polyline(scene, ends, seed + attempt, max_checks, lambda: enclosed() is not None)
             if path is None and not ((end := enclosed()) and end.which == "goal"):
-                path = self._withdrawn(scene, ends, seed, max_checks)
+                path = self._withdrawn(scene, q_goals, ends, seed, max_checks)
             if path is None:
                 end = walled_in()
                 return self._walled_in(fixed, ends, end, seed) if end else self._blocked(scene, ends, seed, max_checks)
@@ -302,17 +306,26 @@ class MotionPlanner:
         self.work.add("checks" if isinstance(checker, FastChecker) else "exact_checks", checker.checks - before)
         return path
 
-    def _withdrawn(self, scene: SceneState, ends: Ends, seed: int, max_checks: int) -> np.ndarray | None:
+    def _drawn_out(
+        self, scene: SceneState, q_goals: Sequence[np.ndarray], allowed: frozenset[Pair], seed: int, max_checks: int
+    ) -> Trajectory | None:
+        """A motion that first draws the hand straight back out of what it overlaps; None if it overlaps nothing, or too
+        much, or there is no such motion."""
+        margins = Margins(self.settings.margin, allowed)
+        near = [] if self._surely_free(scene, scene.q, margins) else self._near(scene, scene.q, margins)
+        if not WEDGED <= min((contact.distance for contact in near), default=0.0) < DEEPEST:
+            return None
+        margins = _relaxed(margins, near)
+        path = self._from_line(scene, lines_back(self.robot, scene.q), q_goals, margins, seed, max_checks)
+        return None if path is None else self._timed(scene, path, margins)
+
+    def _withdrawn(
+        self, scene: SceneState, q_goals: Sequence[np.ndarray], ends: Ends, seed: int, max_checks: int
+    ) -> np.ndarray | None:
         """A path that draws the hand straight back first, from among what hems it in; None if nothing does."""
         if not self._near(scene, scene.q, Margins(HEMMED_IN, ends.margins.allowed)):
             return None
-        for line in lines_back(self.robot, scene.q):
-            self.work.add("ik", len(line))
-            free = not self._contacts(scene, line, ends.margins)
-            path = self._polyline(replace(scene, q=line[-1]), ends, seed, max_checks) if free else None
-            if path is not None:
-                return np.concatenate([line, path[1:]])
-        return None
+        return self._from_line(scene, lines_back(self.robot, scene.q), q_goals, ends.margins, seed, max_checks)
 
     def _risen(
         self, scene: SceneState, q_goals: Sequence[np.ndarray], ends: Ends, seed: int, max_checks: int
@@ -321,15 +334,32 @@ class MotionPlanner:
         touches nothing, or there is no such path."""
         held = frozenset({scene.held.name} if scene.held is not None else ())
         touching = [pair for pair, distance in ends.margins.relaxed.items() if pair & held and distance < TOUCHING]
-        for line in lines_up(self.robot, scene.q) if touching else ():
+        if not touching:
+            return None
+        lines = lines_up(self.robot, scene.q)
+        return self._from_line(scene, lines, q_goals, ends.margins, seed, max_checks, clear_of=touching)
+
+    def _from_line(
+        self,
+        scene: SceneState,
+        lines: Iterable[np.ndarray],
+        q_goals: Sequence[np.ndarray],
+        margins: Margins,
+        seed: int,
+        max_checks: int,
+        clear_of: Collection[Pair] = (),
+    ) -> np.ndarray | None:
+        """A path that begins with one of the lines (n,7) and from its end on keeps the usual margins, off `clear_of`
+        at any rate; None if there is none."""
+        for line in lines:
             self.work.add("ik", len(line))
-            above = replace(scene, q=line[-1])
-            onward = self.ends(above, q_goals, ends.margins.allowed)
-            if isinstance(onward, MotionFailure) or not onward.margins.relaxed.keys().isdisjoint(touching):
+            if self._contacts(scene, line, margins):
                 continue
-            if self._contacts(scene, line, ends.margins):
+            after = replace(scene, q=line[-1])
+            onward = self.ends(after, q_goals, margins.allowed)
+            if isinstance(onward, MotionFailure) or not onward.margins.relaxed.keys().isdisjoint(clear_of):
                 continue
-            path = self._polyline(above, onward, seed, max_checks)
+            path = self._polyline(after, onward, seed, max_checks)
             if path is not None:
                 return np.concatenate([line, path[1:]])
         return None

@@ -161,6 +161,21 @@ def test_a_hand_among_narrow_things_is_drawn_straight_back_first(robot, table, a
     assert planner.audit(start, moved) is None
 
 
+@pytest.mark.parametrize("overlap", [0.002, 0.006, 0.012])
+def test_fingers_that_overlap_what_they_stand_beside_are_drawn_straight_out(robot, table, at, planner, down, overlap):
+    X_WO = at(0.05, -0.62, -0.17)
+    scenario = table([("block", Box((0.097, 0.05, 0.05)), X_WO)])
+    q = planner.ik(down(0.05, -0.62, -0.17, yaw_deg=180.0))[0]
+    start = SceneState(scenario, {"block": X_WO}, q, 0.05 - 2.0 * overlap)
+    moved = planner.move(start, [scenario.robot.q0])
+    assert isinstance(moved, Trajectory)
+    assert np.allclose(moved.end, scenario.robot.q0)
+    out = robot.X_WG(q).actInv(robot.X_WG(moved.at(0.3 * moved.duration)[0]))
+    assert out.translation[2] < -0.02
+    later = [moved.at(t)[0] for t in np.linspace(0.4, 1.0, 20) * moved.duration]
+    assert all(planner.free(start, q, margin=0.0005) for q in later)
+
+
 def test_a_held_body_may_start_pressed_on_what_it_stands_on(sponge_in_hand, planner, down, goal):
     # The sponge reaches 2.5 cm below the fingertips, the table's top is at 5 cm.
     pressed = _touching(planner, down, sponge_in_hand, 0.6, 0.25, 0.074)
@@ -169,7 +184,7 @@ def test_a_held_body_may_start_pressed_on_what_it_stands_on(sponge_in_hand, plan
 
 
 def test_an_arm_deep_in_a_body_cannot_start_and_says_in_which(scene, planner, down, goal):
-    inside = _touching(planner, down, replace(scene, opening=0.05), 0.73, -0.08, 0.12)
+    inside = _touching(planner, down, replace(scene, opening=0.0), 0.73, -0.08, 0.12)
     result = planner.move(inside, [goal(0.6, 0.2, 0.3)])
     assert isinstance(result, MotionFailure)
     assert result.culprits == {"box"}
