@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from pinocchio import SE3
 
-from planner.motion.motion_planner import DEEPEST, MotionPlanner
+from planner.motion.clearance import DEEPEST
+from planner.motion.motion_planner import MotionPlanner
 from planner.motion.trajectory import Trajectory
 from planner.refinement import Pair
 from sim.scene import SceneState, pose_distance

@@ -12,7 +12,8 @@ from bt_tamp.executive.build import build_planner
 from bt_tamp.executive.seams import Seams
 from bt_tamp.options import RunOptions
 from planner.failure import MotionFailure
-from planner.motion.motion_planner import NOTHING, MotionPlanner
+from planner.motion.clearance import NOTHING
+from planner.motion.motion_planner import MotionPlanner
 from planner.motion.trajectory import Trajectory
 from planner.refinement import Pair
 from scenarios.document import parse_document

@@ -11,8 +11,9 @@ import numpy as np
 from bt_tamp.bench.compiled_rrt import plan_compiled
 from bt_tamp.bench.motion_queries import MotionQuery
 from planner.failure import MotionFailure
+from planner.motion.clearance import MotionSettings
 from planner.motion.collision import JOINT_STEP, FastChecker, part_names, self_collision_pairs
-from planner.motion.motion_planner import Ends, MotionPlanner, MotionSettings
+from planner.motion.motion_planner import Ends, MotionPlanner
 from planner.motion.ompl_ import PathSettings, Query, path_length, plan_path
 from planner.motion.shortcut import shortened
 from planner.motion.world import Margins, obstacles

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from planner.failure import MotionFailure
-from planner.motion.motion_planner import NOTHING, MotionPlanner
+from planner.motion.clearance import NOTHING
+from planner.motion.motion_planner import MotionPlanner
 from planner.motion.trajectory import Trajectory
 from planner.refinement import Pair
 from planner.task.planner import TaskPlanner

@@ -10,7 +10,7 @@ from bt_tamp.executive.mission import Mission, mission, planning
 from bt_tamp.executive.plan_node import Planner, PlanNode
 from bt_tamp.executive.seams import REAL, Seams
 from bt_tamp.options import RunOptions
-from planner.motion.motion_planner import MotionSettings
+from planner.motion.clearance import MotionSettings
 from planner.refinement import Work
 from planner.search_then_sample import PlanSettings, SearchThenSample
 from planner.task.facts import goal_facts

@@ -3,8 +3,8 @@
 import numpy as np
 from pinocchio import SE3
 
+from planner.motion.clearance import DEEPEST
 from planner.motion.exact import ExactChecker
-from planner.motion.motion_planner import DEEPEST
 from planner.motion.world import Margins
 from scenarios.names import known
 from scenarios.scenario import Scenario

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from planner.failure import MotionFailure
-from planner.motion.motion_planner import DEEPEST, MotionPlanner
+from planner.motion.clearance import DEEPEST
+from planner.motion.motion_planner import MotionPlanner
 from planner.motion.timing import haste
 from planner.motion.trajectory import Trajectory
 from planner.refinement import Pair

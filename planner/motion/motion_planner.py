@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -12,34 +12,26 @@ from pinocchio import SE3
 from planner.failure import MotionFailure
 from planner.motion.blame import blame
 from planner.motion.checking import CollisionChecker
-from planner.motion.collision import FastChecker, hand_hits, part_names
+from planner.motion.clearance import DEEPEST, NOTHING, Clearance, MotionSettings, relaxed_by
+from planner.motion.collision import FastChecker
 from planner.motion.enclosed import LOOKS, EnclosedEnd, enclosed_end, walls_about
-from planner.motion.exact import Contact, ExactChecker
+from planner.motion.exact import ExactChecker
 from planner.motion.ik import ClosedFormIK
 from planner.motion.ik_numeric import track_numerically
 from planner.motion.lines import CartesianPath, interpolate, track
 from planner.motion.ompl_ import PathSettings, Query, path_length, plan_path
-from planner.motion.recent import Recent
 from planner.motion.shortcut import shortened
 from planner.motion.timing import time_line, time_path, time_path_with_stops
 from planner.motion.trajectory import Trajectory
 from planner.motion.withdrawing import HEMMED_IN, lines_back, lines_up
-from planner.motion.world import FREE_MARGIN, Margins, movables, obstacles
-from planner.refinement import Pair, Work, pairs
+from planner.motion.world import Margins, movables
+from planner.refinement import Pair, Work
 from sim.robot import RobotModel
 from sim.scene import SceneState
 
-NOTHING: frozenset[Pair] = frozenset()
-
-SLACK = 0.0005
-"""Metres by which a pair that is near at the start may come nearer still."""
-
-DEEPEST = -0.004
-"""Distance in metres (negative: overlap) at which the arm may still start: things held or pressed give way a little."""
-
 WEDGED = -0.015
-"""The same where the hand is first drawn straight out: fingers that something holds up stand otherwise than their
-opening tells."""
+"""Distance in metres (negative: overlap) at which the arm may still start by drawing the hand straight out: fingers
+that something holds up stand otherwise than their opening tells."""
 
 TOUCHING = 0.002
 """Metres within which what is held touches what it stands on, or leans on."""
@@ -51,20 +43,6 @@ _CONTROL_SPACINGS = (0.3, 0.1)
 _ATTEMPTS = 3
 
 
-@dataclass(frozen=True)
-class MotionSettings:
-    """planner, goal_bias, restarts, step: see `PathSettings`. Margins in metres: of free moves as they are planned, of
-    lines near contact, of timed trajectories."""
-
-    planner: str = "RRTConnect"
-    goal_bias: float = 0.05
-    restarts: int = 4
-    step: float = 1.2
-    margin: float = FREE_MARGIN
-    line_margin: float = 0.002
-    audit_margin: float = 0.001
-
-
 class Ends(NamedTuple):
     """The goals (7,) of a move that are free, and the margins to be kept on the way to them."""
 
@@ -72,44 +50,20 @@ class Ends(NamedTuple):
     margins: Margins
 
 
-class MotionPlanner:
+class MotionPlanner(Clearance):
     """Plans motions of one robot. Every random choice follows from `seed` and the number of the query.
 
-    Counts in `work` configurations tested for collision, "checks" by the fast model and "exact_checks", and poses
-    solved, "ik".
+    Counts in `work` poses solved, "ik", on top of what `Clearance` counts.
     """
 
     def __init__(
         self, robot: RobotModel, seed: int = 0, settings: MotionSettings | None = None, work: Work | None = None
     ) -> None:
-        self.robot = robot
-        self.settings = MotionSettings() if settings is None else settings
-        self.work = Work() if work is None else work
+        super().__init__(robot, settings, work)
         s = self.settings
         self._path_settings = PathSettings(s.planner, s.goal_bias, s.restarts, s.step)
         self._seed, self._queries = seed, 0
         self._ik = ClosedFormIK(robot)
-        self._limits = np.stack([robot.q_min, robot.q_max])
-        self._recent_exact, self._recent_fast = Recent(ExactChecker), Recent(FastChecker)
-        self._confirmed: tuple[SceneState, frozenset[Pair], Trajectory] | None = None
-
-    def free(
-        self, scene: SceneState, q: np.ndarray, allowed: frozenset[Pair] = NOTHING, margin: float | None = None
-    ) -> bool:
-        """Is q (7,) within the limits, and everything but the allowed pairs at least `margin` metres apart?"""
-        margins = Margins(self.settings.margin if margin is None else margin, allowed)
-        checker = self._exact(scene, margins)
-        self.work.add("exact_checks")
-        return checker.is_free(q)
-
-    def hand_hits(
-        self, scene: SceneState, X_WG: SE3, allowed: frozenset[Pair] = NOTHING, margin: float | None = None
-    ) -> frozenset[str]:
-        """Names of what hand, fingers or held body would come too near to with the gripper at X_WG, wherever the arm
-        is. A cheap look before any inverse kinematics."""
-        margins = Margins(self.settings.line_margin if margin is None else margin, allowed)
-        self.work.add("checks")
-        return hand_hits(self.robot, scene, X_WG, margins)
 
     def ik(self, X_WG: SE3) -> list[np.ndarray]:
         """Configurations (7,) that bring the gripper to X_WG, the furthest from the joint limits first."""
@@ -138,18 +92,6 @@ class MotionPlanner:
         self.work.add("ik", len(path.p_WG))
         return track_numerically(self.robot, path, q)
 
-    def line_is_free(
-        self, scene: SceneState, path: np.ndarray, allowed: frozenset[Pair] = NOTHING, margin: float | None = None
-    ) -> MotionFailure | None:
-        """None if the joint path (n,7) is free by the exact model, else what it hits.
-
-        What touches at its start may stay as near, see `move`. Culprits are the movable bodies it hits, if it hits
-        nothing else.
-        """
-        margins = Margins(self.settings.line_margin if margin is None else margin, allowed)
-        contacts = self._contacts(scene, path, self._leaving(scene, path[0], margins))
-        return blame("the line comes too near:", contacts, movables(scene)) if contacts else None
-
     def timed_line(
         self,
         scene: SceneState,
@@ -171,37 +113,6 @@ class MotionPlanner:
         if failure is None:
             self._confirmed = scene, allowed, trajectory
         return failure or trajectory
-
-    def has_confirmed(self, scene: SceneState, trajectory: Trajectory, allowed: frozenset[Pair] = NOTHING) -> bool:
-        """Is this the very motion that was confirmed last by the exact model, in this very scene?"""
-        if self._confirmed is None:
-            return False
-        known_scene, known_allowed, known = self._confirmed
-        return known is trajectory and known_scene is scene and known_allowed == allowed
-
-    def audit(
-        self,
-        scene: SceneState,
-        trajectory: Trajectory,
-        allowed: frozenset[Pair] = NOTHING,
-        margin: float | None = None,
-        since: float = 0.0,
-        only: frozenset[str] | None = None,
-        deepest: float = -np.inf,
-    ) -> MotionFailure | None:
-        """None if what is left of the trajectory `since` seconds after its start is free by the exact model.
-
-        What is near then already may stay as near, see `move`, unless it is nearer than `deepest` (m; negative:
-        overlap). `only` these bodies are looked at (None: everything).
-        """
-        start = trajectory.at(since)[0]
-        if only is not None:
-            others = frozenset(obstacle.name for obstacle in obstacles(scene)) - only
-            allowed = allowed | pairs(frozenset(part_names(self.robot, scene.held)), others)
-        margins = Margins(self.settings.audit_margin if margin is None else margin, allowed)
-        near = [contact for contact in self._near(scene, start, margins) if contact.distance >= deepest]
-        left = trajectory.q[trajectory.times - trajectory.times[0] > since]
-        return self._audit(scene, np.concatenate([start[None], left]), _relaxed(margins, near))
 
     def move(
         self,
@@ -264,7 +175,7 @@ class MotionPlanner:
         deep = [contact for contact in near if contact.distance < DEEPEST]
         if deep:
             return blame("the arm starts in collision:", deep, movables(scene))
-        margins = _relaxed(margins, near)
+        margins = relaxed_by(margins, near)
         goals = self._free_goals(scene, q_goals, margins)
         return goals if isinstance(goals, MotionFailure) else Ends(goals, margins)
 
@@ -315,7 +226,7 @@ class MotionPlanner:
         near = [] if self._surely_free(scene, scene.q, margins) else self._near(scene, scene.q, margins)
         if not WEDGED <= min((contact.distance for contact in near), default=0.0) < DEEPEST:
             return None
-        margins = _relaxed(margins, near)
+        margins = relaxed_by(margins, near)
         path = self._from_line(scene, lines_back(self.robot, scene.q), q_goals, margins, seed, max_checks)
         return None if path is None else self._timed(scene, path, margins)
 
@@ -415,40 +326,3 @@ class MotionPlanner:
                 self._confirmed = scene, margins.allowed, trajectory
                 return trajectory
         return None
-
-    def _audit(self, scene: SceneState, q: np.ndarray, margins: Margins) -> MotionFailure | None:
-        if np.any(q < self._limits[0]) or np.any(q > self._limits[1]):
-            return MotionFailure("the motion passes a joint limit")
-        contacts = self._contacts(scene, q, margins)
-        return blame("the motion comes too near:", contacts, movables(scene)) if contacts else None
-
-    def _near(self, scene: SceneState, q: np.ndarray, margins: Margins) -> list[Contact]:
-        """Everything that is nearer than its margin at q (7,)."""
-        self.work.add("exact_checks")
-        return self._exact(scene, margins).contacts(q[None])
-
-    def _leaving(self, scene: SceneState, start: np.ndarray, margins: Margins) -> Margins:
-        """Margins of a motion that begins at `start` (7,): what is near there, but not deep in, may stay as near."""
-        near = self._near(scene, start, margins)
-        return _relaxed(margins, [contact for contact in near if contact.distance >= DEEPEST])
-
-    def _contacts(self, scene: SceneState, path: np.ndarray, margins: Margins) -> list[Contact]:
-        """What the path (n,7) hits, up to the first thing that can't be moved aside."""
-        checker = self._exact(scene, margins)
-        dense = checker.densified(path)
-        self.work.add("exact_checks", len(dense))
-        return checker.contacts(dense, enough=movables(scene).isdisjoint)
-
-    def _surely_free(self, scene: SceneState, q: np.ndarray, margins: Margins) -> bool:
-        self.work.add("checks")
-        return self._fast(scene, margins).is_free(q)
-
-    def _fast(self, scene: SceneState, margins: Margins) -> FastChecker:
-        return self._recent_fast.of(self.robot, scene, margins)
-
-    def _exact(self, scene: SceneState, margins: Margins) -> ExactChecker:
-        return self._recent_exact.of(self.robot, scene, margins)
-
-
-def _relaxed(margins: Margins, near: Sequence[Contact]) -> Margins:
-    return replace(margins, relaxed={contact.pair: contact.distance - SLACK for contact in near})

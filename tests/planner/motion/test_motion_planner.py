@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from planner.failure import MotionFailure
+from planner.motion.clearance import MotionSettings
 from planner.motion.exact import ExactChecker
-from planner.motion.motion_planner import MotionPlanner, MotionSettings
+from planner.motion.motion_planner import MotionPlanner
 from planner.motion.ompl_ import path_length
 from planner.motion.trajectory import Trajectory
 from planner.motion.world import Margins
