@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from pinocchio import SE3
 
-from bt_tamp.executive.rest import at_rest
+from bt_tamp.executive.rest import FINGERS_AT_REST, at_rest
 from bt_tamp.executive.sighting import OVERLOOKED, REMEMBERED, Sighting
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
@@ -28,7 +28,6 @@ KEEP_REACH = 0.025
 """Metres from the pads' middle within which a body counts as grasped, and as still held (hysteresis)."""
 
 PAD_DEPTH = 0.01
-FINGERS_AT_REST = 0.01
 
 APART = 0.004
 """Metres between the fingers from which something may be between them."""

@@ -9,7 +9,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_tamp.executive.agenda import Agenda
-from bt_tamp.executive.rest import moving
+from bt_tamp.executive.rest import is_unsettled
 from planner.failure import ExecutionFailure, RefinementFailure
 from planner.refinement import Refinement, Work
 from planner.search_then_sample import NoPlan, SearchThenSample, Solution
@@ -23,6 +23,10 @@ COST = {"checks": 5e-6, "exact_checks": 2e-5, "ik": 1e-4, "expansions": 1e-4}
 
 PATIENCE = 2.0
 """Seconds for which planning waits, at most, until what falls or rolls has come to rest."""
+
+SECOND_LOOK = 0.5
+"""Seconds after which what was planned from must still be so, once the robot is at work, for no plan to be a verdict:
+something may yet slip, or be grasped."""
 
 LOST_PATIENCE = 15.0
 """Seconds for which the arm waits, when it can't go on, for what is nowhere to be seen to turn up again."""
@@ -120,7 +124,7 @@ class PlanNode(Behaviour):
                 self._settling_since = context.observation.t
         if self._outcome is None:
             observation = context.observation
-            if moving(observation) and observation.t - self._settling_since < PATIENCE:
+            if is_unsettled(observation) and observation.t - self._settling_since < PATIENCE:
                 return Status.RUNNING
             self._take_in_failure()
             before = thinking.simulated_cost()
@@ -132,6 +136,8 @@ class PlanNode(Behaviour):
         if isinstance(self._outcome, NoPlan):
             if self._has_changed(context.scene):
                 self._outcome, self._settling_since = None, context.observation.t
+                return Status.RUNNING
+            if self._agenda.has_begun and context.observation.t < self._ready_at + SECOND_LOOK:
                 return Status.RUNNING
             missing = self._agenda.missing(context.scene)
             if missing and not self._is_out_of_patience():
