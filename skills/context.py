@@ -69,6 +69,10 @@ class ActionRun:
                 return phase
         raise LookupError(f"{self.action} has no phase {name!r}, known: {[phase.name for phase in phases]}")
 
+    def has(self, name: str) -> bool:
+        """Is there a refined phase of that name?"""
+        return self.refinement is not None and any(phase.name == name for phase in self.refinement.phases)
+
     def onward(self, phase: Phase) -> Trajectory | None:
         """What a phase's trajectory passes into without a stop: the next phase's, if it ends moving."""
         phases = self.refinement.phases if self.refinement and phase.trajectory.ends_moving else ()

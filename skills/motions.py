@@ -124,6 +124,17 @@ class Follow(PhaseLeaf):
         return Status.RUNNING
 
 
+class FollowIfAny(Follow):
+    """The same, of a phase that is not refined unless it is needed."""
+
+    def initialise(self) -> None:
+        if self._run.has(self.name):
+            super().initialise()
+
+    def update(self) -> Status:
+        return super().update() if self._run.has(self.name) else Status.SUCCESS
+
+
 class Open(PhaseLeaf):
     """Brings the fingers to the phase's opening; what was held is let go."""
 

@@ -11,6 +11,7 @@ import pinocchio as pin
 from pinocchio import SE3
 
 from planner.failure import Blocked, MotionFailure, RefinementFailure
+from planner.motion.trajectory import Trajectory
 from planner.refinement import Phase, pairs
 from planner.stability import room_about, tops
 from planner.support import supports
@@ -211,8 +212,11 @@ def footprint(body: Body, X_WO: SE3) -> list[np.ndarray]:
     return [X_WO.act(centre + half * (2.0 * np.array(signs) - 1.0)) for signs in np.ndindex(2, 2, 2)]
 
 
-PHASES = ("close", "pre-drag", "approach", "descend", "drag", "retract")
-"""Names of the phases of whatever tows."""
+PHASES = ("draw back", "close", "pre-drag", "approach", "descend", "drag", "retract")
+"""Names of the phases of whatever tows. The hand is drawn back only if its fingers stand about something."""
+
+WIDTHS = (0.75, 0.5, 0.25, 0.0)
+"""Shares of their opening at which closing fingers are looked at."""
 
 
 def tow(
@@ -231,7 +235,10 @@ def tow(
     X_WG_end = shifted(X_WG, way)
     X_WG_last = shifted(X_WG_end, way / max(float(np.linalg.norm(way)), 1e-9) * _reserve(toolkit, scene, X_WG_end))
 
-    ready = replace(scene, opening=0.0)
+    back = _drawn_back(toolkit, scene)
+    if isinstance(back, MotionFailure):
+        return back
+    ready = replace(scene, opening=0.0, q=scene.q if back is None else back.end)
     along_with = Held(name, X_WG.actInv(X_WO))
     dragging = replace(ready, held=along_with)
     touching = pairs(robot.finger_links, name)
@@ -262,14 +269,26 @@ def tow(
         return way
     along, down, probe, up = way.timed
     press = pressing.press
+    first = () if back is None else (Phase("draw back", "approach", back, scene.opening),)
     return (
-        Phase("close", "open", way.reach.standstill(scene.q), 0.0),
+        *first,
+        Phase("close", "open", way.reach.standstill(ready.q), 0.0),
         Phase("pre-drag", "move", way.reach, 0.0),
         Phase("approach", "approach", down, 0.0, None, touching),
         Phase("descend", "touch", probe, 0.0, None, sliding, press),
         Phase("drag", "slide", along, 0.0, along_with, sliding, press),
         Phase("retract", "approach", up, 0.0, None, sliding),
     )
+
+
+def _drawn_back(toolkit: Toolkit, scene: SceneState) -> Trajectory | MotionFailure | None:
+    """The line along which the hand is drawn back before its fingers close; None if these meet nothing where it is."""
+    X_WG = toolkit.robot.X_WG(scene.q)
+    narrower = (replace(scene, opening=share * scene.opening) for share in WIDTHS)
+    if not any(toolkit.motion.hand_hits(narrow, X_WG, margin=0.0) for narrow in narrower):
+        return None
+    line = toolkit.motion.drawn_back(scene, NEAR_SPEED)
+    return MotionFailure("the fingers stand about something and can't be drawn back") if line is None else line
 
 
 def _reserve(toolkit: Toolkit, scene: SceneState, X_WG_end: SE3) -> float:

@@ -8,7 +8,7 @@ from planner.motion.motion_planner import MotionPlanner
 from sim.scene import SceneState
 from skills.conditions import Achieved
 from skills.context import ActionRun, SkillContext
-from skills.motions import Follow, Open, Touch, guarded, sequence
+from skills.motions import Follow, FollowIfAny, Open, Touch, guarded, sequence
 from skills.refine import PathFree, Refine
 from skills.taken_along import KeepPressing, Predict, TakenAlong, Tow
 
@@ -24,6 +24,7 @@ def towing_tree(
     be, or near enough."""
     reach = sequence(
         "to the object",
+        FollowIfAny("draw back", run, context),
         Open("close", run, context),
         Follow("pre-drag", run, context),
         Follow("approach", run, context),

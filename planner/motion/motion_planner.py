@@ -114,6 +114,16 @@ class MotionPlanner(Clearance):
             self._confirmed = scene, allowed, trajectory
         return failure or trajectory
 
+    def drawn_back(self, scene: SceneState, tcp_speed: float) -> Trajectory | None:
+        """The hand drawn straight back from where it is at tcp_speed (m/s), as far as there is room; None if there is
+        none."""
+        for line in lines_back(self.robot, scene.q):
+            self.work.add("ik", len(line))
+            timed = self.timed_line(scene, line, tcp_speed) if self.line_is_free(scene, line) is None else None
+            if isinstance(timed, Trajectory):
+                return timed
+        return None
+
     def move(
         self,
         scene: SceneState,

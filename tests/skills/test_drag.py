@@ -313,3 +313,22 @@ def test_what_lies_on_something_else_is_not_dragged_off_it():
         assert isinstance(failure, RefinementFailure)
         assert failure.reason == "book lies on box, not on the table"
         assert not failure.culprit_sets
+
+
+def test_a_hand_whose_fingers_stand_about_the_object_is_drawn_back_before_they_close():
+    overhanging = with_pose(scene_with("box", scene="fig3"), "box", 0.6, -0.23)
+    picking = Bench(overhanging).refine(action("pick(box, table)"))
+    assert isinstance(picking, Refinement), picking
+    about = picking.phases[1].trajectory.end
+    pushed_back = with_pose(overhanging, "box", 0.6, -0.19)
+    bench = Bench(replace(pushed_back, robot=replace(pushed_back.robot, q0=about)))
+    assert bench.do("drag(box, table)") is Status.SUCCESS, bench.context.failure
+    assert bench.latest.has("draw back")
+    assert bench.do("pick(box, table)") is Status.SUCCESS
+
+
+def test_a_hand_that_stands_free_closes_its_fingers_where_it_is():
+    bench = Bench(scene_with("box", scene="fig3"))
+    found = bench.refine(action("drag(box, table)"))
+    assert isinstance(found, Refinement)
+    assert found.phases[0].name == "close"
