@@ -13,6 +13,10 @@ SLIPPING = 0.2
 """m/s by which a body moves otherwise than the hand, from which on the hand holds it no longer: it falls, and with what
 force it lands isn't the arm's doing."""
 
+LANDING = 0.1
+"""Seconds after which what slipped and moves along with the hand again is held again: landing, it stands still at
+once."""
+
 
 class PeakAudit:
     """Reads the engine's truth; it judges, and nothing that acts reads it. `peak`: N, the net force of one thing: what
@@ -22,6 +26,7 @@ class PeakAudit:
         self._robot = robot
         self._links = frozenset(robot.links)
         self.peak = 0.0
+        self._slipped_at = -LANDING
 
     def look(self, contacts: Sequence[Contact], truth: Observation, held: str | None) -> None:
         """Take in the contacts of this instant. held: what the hand is believed to hold."""
@@ -43,7 +48,9 @@ class PeakAudit:
         V_WG = self._robot.V_WG(truth.q, truth.v)
         lever = truth.poses[name].translation - self._robot.X_WG(truth.q).translation
         relative = truth.velocities[name][:3] - V_WG[:3] - np.cross(V_WG[3:], lever)
-        return math.hypot(*relative.tolist()) > SLIPPING
+        if math.hypot(*relative.tolist()) > SLIPPING:
+            self._slipped_at = truth.t
+        return truth.t - self._slipped_at < LANDING
 
 
 _BASE = {"pedestal", "link_0"}

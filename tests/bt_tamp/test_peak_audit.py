@@ -62,6 +62,15 @@ def test_what_falls_from_the_hand_lands_for_itself_even_while_it_is_still_believ
     assert peak(robot, contacts, falling(truth, "box", 0.5), held="box") == pytest.approx(20.0)
 
 
+@pytest.mark.parametrize(("after", "counted"), [(0.02, 0.0), (0.2, 300.0)])
+def test_what_has_just_fallen_is_not_held_yet_again_as_it_lands(seen, after, counted):
+    robot, truth = seen
+    audit = PeakAudit(robot)
+    audit.look([], falling(truth, "box", 0.5), "box")
+    audit.look([touch("table", "box", 300.0)], replace(truth, t=truth.t + after), "box")
+    assert audit.peak == pytest.approx(counted)
+
+
 def test_what_the_hand_swings_along_is_held(seen):
     robot, truth = seen
     v = np.full(7, 0.5)
