@@ -14,7 +14,7 @@ import pinocchio as pin
 from pinocchio import SE3
 
 from planner.antipodal import CLEARANCE, Grips, antipodal_grips
-from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, extents
+from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, distance_to, extents
 from sim.robot import Gripper
 
 APPROACH_STEP = np.radians(15.0)
@@ -32,6 +32,12 @@ CLEARED = 0.3
 
 LEAST_DEPTH = 0.009
 """Metres that the fingers reach over a thin object at least: less doesn't keep it from tilting."""
+
+TIP = 0.01
+"""Metres from the fingertips' ends to their middle."""
+
+LOOSE = 0.003
+"""Metres from the tips' middle to what is held from which on it hangs by their ends: carried far it is lost."""
 
 LYING = 0.7
 """Cosine of the angle between a cylinder's axis and the vertical below which it lies rather than stands."""
@@ -65,6 +71,11 @@ class Grasp:
 def open_width(gripper: Gripper, width: float) -> float:
     """Opening in metres with which to come near an object of `width`: 15 mm to spare a side, if the stroke allows."""
     return min(gripper.stroke, width + 0.03)
+
+
+def hangs_by_the_tips(shape: Shape, X_GO: SE3) -> bool:
+    """Do the fingertips hold a shape at X_GO in the hand by their ends only?"""
+    return distance_to(shape, X_GO.actInv(np.array([0.0, 0.0, -TIP]))) > LOOSE
 
 
 def grasps(shape: Shape, X_WO: SE3, gripper: Gripper, base: np.ndarray, rng: np.random.Generator) -> Iterator[Grasp]:

@@ -73,13 +73,15 @@ class Refinement:
 
 @dataclass(frozen=True)
 class Budget:
-    """How much one refinement may cost: samples tried."""
+    """How much one refinement may cost: samples tried. is_widened: nothing was found with less, and what is only unwise
+    may be tried, too."""
 
     tries: int = 20
+    is_widened: bool = False
 
     def widened(self, factor: int = 2) -> "Budget":
         """The same budget, `factor` times as large."""
-        return Budget(self.tries * factor)
+        return Budget(self.tries * factor, is_widened=True)
 
 
 @dataclass(frozen=True)

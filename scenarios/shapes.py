@@ -313,3 +313,21 @@ def _triple(p: np.ndarray) -> tuple[float, float, float]:
     """Rounded far below what matters, so that what is written to a file and read again is the same."""
     x, y, z = (round(float(c), 12) for c in p)
     return x, y, z
+
+
+def distance_to(shape: Shape, p_O: np.ndarray) -> float:
+    """Distance in metres from a point p_O (3,), in the shape's frame, to the shape; 0 inside.
+
+    What lies in a compound's hollow is inside: fingers that hold a mug from without have nothing between their middles.
+    Beyond an edge of a hull it is the distance to the nearer face's plane, which is less.
+    """
+    match shape:
+        case Box(size):
+            return float(np.linalg.norm(np.maximum(np.abs(p_O) - np.array(size) / 2, 0.0)))
+        case Cylinder(radius, height):
+            radial = max(float(np.hypot(p_O[0], p_O[1])) - radius, 0.0)
+            return float(np.hypot(radial, max(abs(float(p_O[2])) - height / 2, 0.0)))
+        case Sphere(radius):
+            return max(float(np.linalg.norm(p_O)) - radius, 0.0)
+        case Hull() | Compound():
+            return max(outline(shape).outside(p_O), 0.0)

@@ -8,8 +8,8 @@ import pinocchio as pin
 from pinocchio import SE3
 from py_trees.behaviour import Behaviour
 
-from planner.failure import MotionFailure, RefinementFailure
-from planner.grasps import open_width
+from planner.failure import Blocked, MotionFailure, RefinementFailure
+from planner.grasps import hangs_by_the_tips, open_width
 from planner.packing import clear_first, standing_about
 from planner.placements import Placement, Surface, placements, surface_of, top_of
 from planner.refinement import Budget, Hints, Phase, Refinement, pairs
@@ -17,6 +17,7 @@ from planner.support import borne
 from planner.task.facts import place_of
 from planner.task.situation import DISPLACED, TURNED
 from planner.task.symbols import GroundAction
+from scenarios.names import TABLE
 from scenarios.scenario import Region, Scenario, Table
 from scenarios.shapes import Shape, inscribed_radius
 from sim.scene import SceneState
@@ -40,10 +41,10 @@ TIGHT = 0.014
 
 def place_named(scenario: Scenario, name: str) -> Region | Table:
     """The region of that name, or the table. Raises KeyError naming the known places."""
-    if name == "table":
+    if name == TABLE:
         return scenario.table
     if name not in scenario.regions:
-        raise KeyError(f"unknown place {name!r}, known: {', '.join(['table', *sorted(scenario.regions)])}")
+        raise KeyError(f"unknown place {name!r}, known: {', '.join([TABLE, *sorted(scenario.regions)])}")
     return scenario.regions[name]
 
 
@@ -97,6 +98,10 @@ class Place:
         name, goal = action.args[:2]
         if scene.held is None or scene.held.name != name:
             return RefinementFailure(action, f"the hand does not hold {name}")
+        body = scene.scenario.bodies[name]
+        if goal != TABLE and not budget.is_widened and hangs_by_the_tips(body.shape, scene.held.X_GO):
+            loose = f"{name} hangs by the fingertips' ends, too loosely to be carried off the table"
+            return RefinementFailure(action, loose, (Blocked(None, loose),))
 
         along = borne(scene)
         coming_along = pairs(self._kit.robot.hand_links | {name}, along) if along else frozenset()
@@ -112,7 +117,6 @@ class Place:
                 return Unfit(f"{', '.join(sorted(there))} on {name} would be driven into {hit}", culprits)
             return tuple(replace(phase, allowed=phase.allowed | coming_along) for phase in outcome)
 
-        body = scene.scenario.bodies[name]
         too_large = wider_than(place_named(scene.scenario, goal), body.shape)
         if too_large is not None:
             return RefinementFailure(action, f"{name} {too_large} {goal}", proof="anywhere")

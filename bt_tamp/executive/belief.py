@@ -9,9 +9,10 @@ from pinocchio import SE3
 
 from bt_tamp.executive.rest import FINGERS_AT_REST, at_rest
 from bt_tamp.executive.sighting import OVERLOOKED, REMEMBERED, Sighting
+from planner.grasps import TIP
 from planner.task.facts import place_of
 from scenarios.scenario import Scenario
-from scenarios.shapes import Box, Compound, Cylinder, Hull, Shape, Sphere, outline
+from scenarios.shapes import distance_to
 from sim.plant import Observation
 from sim.robot import RobotModel
 from sim.scene import Held, SceneState, is_on_floor, pose_distance
@@ -27,7 +28,6 @@ GRASP_REACH = 0.008
 KEEP_REACH = 0.025
 """Metres from the pads' middle within which a body counts as grasped, and as still held (hysteresis)."""
 
-PAD_DEPTH = 0.01
 
 APART = 0.004
 """Metres between the fingers from which something may be between them."""
@@ -146,7 +146,7 @@ class Belief:
             return None
         if abs(observation.opening_velocity) > FINGERS_AT_REST and self._held is None:
             return None
-        pads = X_WG.act(np.array([0.0, 0.0, -PAD_DEPTH]))
+        pads = X_WG.act(np.array([0.0, 0.0, -TIP]))
 
         def gap(name: str) -> float:
             return distance_to(self._declared.bodies[name].shape, poses[name].actInv(pads))
@@ -165,21 +165,3 @@ class Belief:
             return False
         scene = SceneState(self._scenario, poses, observation.q, observation.opening)
         return place_of(scene, name) is None and not is_on_floor(scene, name)
-
-
-def distance_to(shape: Shape, p_O: np.ndarray) -> float:
-    """Distance in metres from a point p_O (3,), in the shape's frame, to the shape; 0 inside.
-
-    What lies in a compound's hollow is inside: fingers that hold a mug from without have nothing between their middles.
-    Beyond an edge of a hull it is the distance to the nearer face's plane, which is less.
-    """
-    match shape:
-        case Box(size):
-            return float(np.linalg.norm(np.maximum(np.abs(p_O) - np.array(size) / 2, 0.0)))
-        case Cylinder(radius, height):
-            radial = max(float(np.hypot(p_O[0], p_O[1])) - radius, 0.0)
-            return float(np.hypot(radial, max(abs(float(p_O[2])) - height / 2, 0.0)))
-        case Sphere(radius):
-            return max(float(np.linalg.norm(p_O)) - radius, 0.0)
-        case Hull() | Compound():
-            return max(outline(shape).outside(p_O), 0.0)

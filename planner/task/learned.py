@@ -346,7 +346,9 @@ class Learned:
             case.forget(is_gone)
 
     def _sentence(self, action: GroundAction, own: Spot, case: Case) -> str:
-        place = f"as {own.body} lies" if own.left_by is None else f"with {own}"
+        seen = self._seen.get(own.body)
+        lies = "is held" if seen is not None and seen.is_held else "lies"
+        place = f"as {own.body} {lies}" if own.left_by is None else f"with {own}"
         if case.is_proof:
             return f"{action} is impossible {place}: {case.reason}"
         options = sorted(case.minimal(), key=lambda needs: (len(needs), str(in_order(needs))))

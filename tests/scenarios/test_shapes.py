@@ -18,6 +18,7 @@ from scenarios.shapes import (
     bounding_radius,
     bounds,
     convex_parts,
+    distance_to,
     extents,
     inertia,
     inscribed_radius,
@@ -131,3 +132,20 @@ def test_a_mugs_hollow_has_no_inscribed_ball_and_a_hulls_is_that_of_its_nearest_
     assert inscribed_radius(_mug()) == 0.0
     assert inscribed_radius(Hull.of(CUBE)[0]) == pytest.approx(0.05)
     assert inscribed_radius(Compound.of([(Box((0.1, 0.2, 0.3)), _at(0, 0, 0))])[0]) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("shape", [Box((0.1, 0.06, 0.04)), Cylinder(0.03, 0.1), Sphere(0.04), Hull.of(CUBE)[0], _mug()])
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000))
+def test_the_distance_to_a_shape_is_none_inside_and_at_most_that_to_any_point_of_it(shape, seed):
+    rng = np.random.default_rng(seed)
+    lower, upper = bounds(shape)
+    p_O = rng.uniform(lower - 0.1, upper + 0.1)
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    # The shape lies on the near side of its tangent plane, so that a point beyond it is at least as far.
+    beyond = float(direction @ p_O) - reach(shape, direction)
+    if isinstance(shape, Box | Cylinder | Sphere):
+        assert distance_to(shape, p_O) >= beyond - 1e-9
+    assert distance_to(shape, p_O) <= np.linalg.norm(p_O - middle(shape)) + 1e-9
+    assert distance_to(shape, middle(shape)) == 0.0

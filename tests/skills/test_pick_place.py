@@ -14,7 +14,7 @@ from planner.placements import Placement
 from planner.refinement import Budget, Hints, Refinement, pairs
 from planner.task.facts import place_of
 from scenarios.shapes import Box, Cylinder, Hull, reach
-from sim.scene import pose_distance
+from sim.scene import Held, pose_distance
 
 
 @pytest.mark.parametrize(("x", "y", "yaw"), [(0.68, -0.08, 0.0), (0.55, 0.2, 0.6)])
@@ -199,3 +199,35 @@ def test_a_tool_is_laid_down_where_it_can_be_taken_up_again_if_it_comes_to_lie_a
                 )
                 again = bench.refine(action("pick(sponge, left_bin)"))
                 assert isinstance(again, Refinement), (seed, yaw, step, again.reason)
+
+
+def _held_by(depth):
+    """A bench with the sponge in the hand, the fingertips reaching `depth` metres over it."""
+    bench = Bench(scene_with("sponge"))
+    half = bench.scene.scenario.bodies["sponge"].shape.size[2] / 2
+    # The hand points down, above the table.
+    q = next(q for q in bench.motion.ik(SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.6, 0.1, 0.3]))))
+    X_GO = SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, half - depth]))
+    X_GO = X_GO * SE3(pin.rpy.rpyToMatrix(0.0, 0.0, np.pi / 2), np.zeros(3))
+    opening = bench.scene.scenario.bodies["sponge"].shape.size[0]
+    there = bench.scene.moved("sponge", bench.robot.X_WG(q) * X_GO)
+    bench.context.scene = replace(there, q=q, opening=opening, held=Held("sponge", X_GO))
+    return bench
+
+
+@pytest.mark.parametrize(("depth", "is_tight"), [(0.02, True), (0.009, True), (0.005, False)])
+def test_what_hangs_by_the_fingertips_ends_is_carried_no_farther_than_the_table(depth, is_tight):
+    bench = _held_by(depth)
+    into_bin = bench.refine(action("place(sponge, left_bin)"))
+    assert isinstance(into_bin, Refinement) is is_tight, into_bin
+    if not is_tight:
+        assert into_bin.reason == "sponge hangs by the fingertips' ends, too loosely to be carried off the table"
+    assert isinstance(bench.refine(action("place(sponge, table)")), Refinement)
+
+
+def test_where_nothing_else_was_found_it_is_carried_all_the_same():
+    bench = _held_by(0.005)
+    into_bin = bench.skills["place"].refine(
+        action("place(sponge, left_bin)"), bench.scene, np.random.default_rng(0), Budget().widened(), Hints()
+    )
+    assert isinstance(into_bin, Refinement), into_bin
