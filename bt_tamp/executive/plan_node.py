@@ -75,7 +75,7 @@ class Planner:
         return outcome
 
     def refine(
-        self, action: GroundAction, scene: SceneState, rest: Sequence[GroundAction]
+        self, action: GroundAction, scene: SceneState, rest: Sequence[GroundAction] = ()
     ) -> tuple[Refinement | RefinementFailure, float]:
         """One action refined again in the scene as it is believed now, `rest` to follow, and the simulated seconds it
         costs."""

@@ -64,7 +64,10 @@ def test_every_phase_of_fig1_is_one_that_its_skill_declares_in_that_order(fig1):
         if event["kind"] == "phase":
             begun.setdefault(event["action"], []).append(event["phase"])
     assert len(begun) == 9
-    assert all(tuple(names) == phases()[action.partition("(")[0]] for action, names in begun.items())
+    for action, names in begun.items():
+        declared = phases()[action.partition("(")[0]]
+        # Fingers that stand about nothing need not be drawn back.
+        assert names == [name for name in declared if name != "draw back"]
 
 
 def test_fig1_leaves_a_complete_folder(fig1):
