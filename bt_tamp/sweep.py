@@ -94,10 +94,10 @@ def run_jobs(
                 executor = idle.pop()
                 tries[job] += 1
                 try:
-                    future = executor.submit(work, job)
+                    future = _submitted(executor, work, job)
                 except BrokenProcessPool:  # Its process vanished while it was idle.
                     executor = _executor()
-                    future = executor.submit(work, job)
+                    future = _submitted(executor, work, job)
                 running[future] = _Running(job, executor, time.monotonic() + allowed(job))
             if not running:
                 return
@@ -123,8 +123,6 @@ def run_jobs(
 
 def run_job(job: Job) -> Finished:
     """Run one job in this process, without a folder. An error in our code is an outcome too."""
-    # The terminal's Ctrl-C reaches the whole group; the parent decides what ends.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     from bt_tamp.quiet import quiet_imports
 
     with quiet_imports():
@@ -150,6 +148,19 @@ def _executor() -> ProcessPoolExecutor:
     return ProcessPoolExecutor(
         max_workers=1, env=dict.fromkeys(THREADS, "1"), initializer=_end_with, initargs=(os.getpid(),)
     )
+
+
+def _submitted(executor: ProcessPoolExecutor, work: Callable[[Job], Finished], job: Job) -> Future:
+    """The job given to its process, which begins now if it has not yet.
+
+    The terminal's Ctrl-C reaches the whole group, and the parent decides what ends: a process begun while the signal is
+    blocked never hears of it, the parent does afterwards.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return executor.submit(work, job)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _end_with(parent: int) -> None:

@@ -91,6 +91,15 @@ def test_a_run_that_hangs_in_native_code_is_ended_recorded_and_costs_no_other() 
     wait_for_the_end_of([int(found[0].result or 0)])
 
 
+def test_ctrl_c_reaches_the_parent_alone_which_decides_what_ends() -> None:
+    def work(given: Job) -> Finished:
+        is_deaf = signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+        return Finished(given, "goal_reached", "deaf" if is_deaf else "listening")
+
+    assert [done.reason for done in run_jobs(map(job, range(3)), 2, work)] == ["deaf"] * 3
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
 def test_a_run_gets_more_real_time_the_longer_it_may_simulate() -> None:
     short, long = (patience(Job("fig2", RunOptions(max_sim_time=seconds))) for seconds in (10.0, 1000.0))
     assert 60.0 < short < long
