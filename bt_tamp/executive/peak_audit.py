@@ -10,8 +10,11 @@ from sim.plant import Observation
 from sim.robot import RobotModel
 
 SLIPPING = 0.2
-"""m/s by which a body moves otherwise than the hand, from which on the hand holds it no longer: it falls, and with what
-force it lands isn't the arm's doing."""
+"""m/s by which a body moves otherwise than the hand once it slips from it."""
+
+FALLING = 0.02
+"""Seconds of slipping after which the hand holds it no longer: with what force it lands then isn't the arm's doing. A
+blow that tears something from the hand counts, for it slips only from then on."""
 
 LANDING = 0.1
 """Seconds after which what slipped and moves along with the hand again is held again: landing, it stands still at
@@ -26,6 +29,7 @@ class PeakAudit:
         self._robot = robot
         self._links = frozenset(robot.links)
         self.peak = 0.0
+        self._slips_since: float | None = None
         self._slipped_at = -LANDING
 
     def look(self, contacts: Sequence[Contact], truth: Observation, held: str | None) -> None:
@@ -49,8 +53,11 @@ class PeakAudit:
         lever = truth.poses[name].translation - self._robot.X_WG(truth.q).translation
         relative = truth.velocities[name][:3] - V_WG[:3] - np.cross(V_WG[3:], lever)
         if math.hypot(*relative.tolist()) > SLIPPING:
+            self._slips_since = truth.t if self._slips_since is None else self._slips_since
             self._slipped_at = truth.t
-        return truth.t - self._slipped_at < LANDING
+        elif truth.t - self._slipped_at >= LANDING:
+            self._slips_since = None
+        return self._slips_since is not None and truth.t - self._slips_since >= FALLING
 
 
 _BASE = {"pedestal", "link_0"}

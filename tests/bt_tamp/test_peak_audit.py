@@ -58,11 +58,22 @@ def test_what_the_held_body_meets_counts_while_it_moves_with_the_hand(seen):
 
 def test_what_falls_from_the_hand_lands_for_itself_even_while_it_is_still_believed_held(seen):
     robot, truth = seen
+    audit, falls = PeakAudit(robot), falling(truth, "box", 0.5)
+    audit.look([], falls, "box")
     contacts = [touch("table", "box", 300.0), touch("finger_left", "box", 20.0)]
-    assert peak(robot, contacts, falling(truth, "box", 0.5), held="box") == pytest.approx(20.0)
+    audit.look(contacts, replace(falls, t=truth.t + 0.03), "box")
+    assert audit.peak == pytest.approx(20.0)
 
 
-@pytest.mark.parametrize(("after", "counted"), [(0.02, 0.0), (0.2, 300.0)])
+def test_a_blow_that_tears_what_is_held_from_the_hand_counts(seen):
+    robot, truth = seen
+    audit, torn = PeakAudit(robot), falling(truth, "box", 0.5)
+    audit.look([], truth, "box")
+    audit.look([touch("table", "box", 300.0)], replace(torn, t=truth.t + 0.01), "box")
+    assert audit.peak == pytest.approx(300.0)
+
+
+@pytest.mark.parametrize(("after", "counted"), [(0.03, 0.0), (0.2, 300.0)])
 def test_what_has_just_fallen_is_not_held_yet_again_as_it_lands(seen, after, counted):
     robot, truth = seen
     audit = PeakAudit(robot)
